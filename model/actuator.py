@@ -25,6 +25,7 @@ from dearig.model.network import HEAD, nominal_pull, shape_at
 from dearig.model.sensor import at_sensor
 
 __all__ = [
+    "NO_AIR",
     "STATUS_WORDS",
     "Actuator",
     "Drive",
@@ -48,22 +49,33 @@ STATUS_WORDS = MappingProxyType(
 )
 
 
+#: Air as the kernel takes it where nothing was recorded.
+NO_AIR = np.zeros((2, 0))
+
+
 @dataclass(frozen=True)
 class Drive:
     """Voltage at the film over time: ``time`` (N,) s, ``voltage`` (N,) V.
 
     Time increases and need not be even. ``hold`` says what happens between samples: True, the
     voltage stands until the next (a converter's output); False, it is linear. ``warmth`` (N,) K is
-    the temperature above that of the start, None where no thermometer was recorded.
+    the temperature of the room above that of the start, ``moisture`` (N,) its relative humidity (0
+    to 1) above that of the start, None where they were not recorded. ``temperature`` in K and
+    ``humidity`` are those of the start, less the reference of ``dearig.model.environment``; None
+    where they are not known.
     """
 
     time: np.ndarray
     voltage: np.ndarray
     hold: bool = False
     warmth: np.ndarray | None = None
+    moisture: np.ndarray | None = None
+    temperature: float | None = None
+    humidity: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("time", "voltage", *([] if self.warmth is None else ["warmth"])):
+        recorded = [n for n in ("warmth", "moisture") if getattr(self, n) is not None]
+        for name in ("time", "voltage", *recorded):
             object.__setattr__(
                 self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             )
@@ -72,8 +84,10 @@ class Drive:
                 f"a drive takes two arrays of one length of at least 2, "
                 f"not {self.time.shape} and {self.voltage.shape}"
             )
-        if self.warmth is not None and self.warmth.shape != self.time.shape:
-            raise ModelError(f"{self.warmth.size} temperatures at {self.time.size} times")
+        for name, what in (("warmth", "temperatures"), ("moisture", "humidities")):
+            values = getattr(self, name)
+            if values is not None and values.shape != self.time.shape:
+                raise ModelError(f"{values.size} {what} at {self.time.size} times")
 
     @property
     def ends(self) -> np.ndarray:
@@ -81,9 +95,15 @@ class Drive:
         return ends_of(self.voltage, self.hold)
 
     @property
-    def temperature(self) -> np.ndarray:
-        """``warmth`` as the kernel takes it: (N,), or (0,) where there is none."""
-        return np.zeros(0) if self.warmth is None else self.warmth
+    def air(self) -> np.ndarray:
+        """``warmth`` and ``moisture`` as the kernel takes them: (2, N), or (2, 0) without any."""
+        if self.warmth is None and self.moisture is None:
+            return NO_AIR
+        rows = np.zeros((2, self.time.size))
+        for row, values in zip(rows, (self.warmth, self.moisture), strict=True):
+            if values is not None:
+                row[:] = values
+        return rows
 
 
 @dataclass(frozen=True)
@@ -166,13 +186,13 @@ class Actuator:
         ``lag`` s is the known age of a reading: the time by which the displacement is late.
         """
         c = self.coefficients()
-        status, rest = at_rest(c)
+        status, rest = at_rest(c, drive)
         stretch, rate = np.full(drive.time.size, rest), np.zeros(drive.time.size)
         reached = 0
         y = initial_state(c, rest)
         if status == kernel.OK:
             status, reached, _ = kernel.drive_by_voltage(
-                c, drive.time, drive.voltage, drive.ends, drive.temperature, y, stretch, rate
+                c, drive.time, drive.voltage, drive.ends, drive.air, y, stretch, rate
             )
         displacement, velocity = np.empty_like(stretch), np.empty_like(rate)
         moved = (stretch - rest) * self.film.length
@@ -244,8 +264,13 @@ def _modulus_at_rest(c: np.ndarray, stretch: float) -> float:
     return float(c[at.FORCE] / pull)
 
 
-def at_rest(c: np.ndarray) -> tuple[int, float]:
-    """Return ``(status, stretch)`` under the load at 0 V; enter it in the coefficients ``c``."""
+def at_rest(c: np.ndarray, drive: Drive | None = None) -> tuple[int, float]:
+    """Return ``(status, stretch)`` under the load at 0 V; enter it in the coefficients ``c``.
+
+    The air is that of the start of ``drive``, or the reference. It is entered too.
+    """
+    c[at.AIR_TEMPERATURE] = (drive.temperature if drive else None) or 0.0
+    c[at.AIR_HUMIDITY] = (drive.humidity if drive else None) or 0.0
     status, rest = kernel.rest_stretch(c, 0.0)
     c[at.REST] = rest
     return status, rest
@@ -294,11 +319,11 @@ def readings_of(
     times = drive.time if times is None else times
     c = cs[0].copy()
     readings, steps = np.zeros((len(cs), times.size)), 0
-    status, rest = at_rest(c)
+    status, rest = at_rest(c, drive)
     if status == kernel.OK:
         x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
         status, _, steps = kernel.drive_by_voltage(
-            c, drive.time, drive.voltage, drive.ends, drive.temperature,
+            c, drive.time, drive.voltage, drive.ends, drive.air,
             initial_state(c, rest), x, u, fidelity,
         )  # fmt: skip
         x -= rest

@@ -8,6 +8,8 @@ for each spring, the equilibrium spring first. ``dearig.model.network.HEAD`` is 
 from __future__ import annotations
 
 __all__ = [
+    "AIR_HUMIDITY",
+    "AIR_TEMPERATURE",
     "CAPACITANCE",
     "EFFECTS_AT",
     "ELECTRIC",
@@ -38,7 +40,9 @@ SECTION = 6  #: m^2: L2 Z
 THICKNESS = 7  #: m: Z
 CAPACITANCE = 8  #: F: of the film before it is stretched
 REST = 9  #: stretch at rest, from which effects count; filled in before a kernel starts
-EFFECTS_AT = 10  #: where the values of the effects begin
+AIR_TEMPERATURE = 10  #: K: of the air as the record began, less ``environment.CELSIUS``; or 0
+AIR_HUMIDITY = 11  #: relative humidity then, less ``environment.HUMIDITY``; 0 where not known
+EFFECTS_AT = 12  #: where the values of the effects begin
 
 # each spring
 KIND = 0  #: code of the strain energy

@@ -88,10 +88,14 @@ class ActuatorRecord:
         starts, last = self.time[rows[:, 0]], self.time[rows[-1, -1]]
         before = np.append(steps[:1], steps)[rows[:, 0]]
         edges = np.append(starts - 0.5 * before, last + 0.5 * steps[-1])
-        drive = Drive(t, _pulling_alike(self.drive, edges), hold=False)
-        warmth = self.drive.warmth
-        if warmth is not None:
-            drive = replace(drive, warmth=warmth[rows].mean(axis=1))
+        drive = Drive(
+            t, _pulling_alike(self.drive, edges), hold=False,
+            temperature=self.drive.temperature, humidity=self.drive.humidity,
+        )  # fmt: skip
+        for name in ("warmth", "moisture"):
+            values = getattr(self.drive, name)
+            if values is not None:
+                drive = replace(drive, **{name: values[rows].mean(axis=1)})
         valid = None if self.valid is None else np.all(self.valid[rows], axis=1)
         return replace(
             self,

@@ -7,9 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import STATUS_WORDS, Actuator, at_rest, ends_of, initial_state
-from dearig.model.effects import SENSOR_MEMORY
-from dearig.sim_backend.plant import Motion
+from dearig.model.actuator import (
+    NO_AIR,
+    STATUS_WORDS,
+    Actuator,
+    Drive,
+    at_rest,
+    ends_of,
+    initial_state,
+)
+from dearig.model.effects import EFFECTS, SENSOR_MEMORY
+from dearig.model.environment import CELSIUS, HUMIDITY
+from dearig.sim_backend.plant import Air, Motion
 
 __all__ = ["ModelPlant"]
 
@@ -24,16 +33,19 @@ class ModelPlant:
     state: np.ndarray
     sensor: np.ndarray
     failed: bool = False
+    air: Air | None = None
 
     @classmethod
-    def at_rest(cls, actuator: Actuator) -> ModelPlant:
-        """Return the film relaxed under its load. Raises ``ModelError`` without a rest state."""
+    def at_rest(cls, actuator: Actuator, air: Air | None = None) -> ModelPlant:
+        """Return the film relaxed under its load. Raises ``ModelError`` without a rest state.
+
+        As the model has it, the film is in equilibrium with the ``air`` at the start of a run.
+        """
         actuator.rest()
         coefficients = actuator.coefficients()
-        _, rest = at_rest(coefficients)
-        return cls(
-            actuator, coefficients, rest, initial_state(coefficients, rest), np.zeros(SENSOR_MEMORY)
-        )
+        _, rest = at_rest(coefficients, None if air is None else _start(air))
+        state = initial_state(coefficients, rest)
+        return cls(actuator, coefficients, rest, state, np.zeros(SENSOR_MEMORY), air=air)
 
     @property
     def capacitance(self) -> float:
@@ -43,6 +55,12 @@ class ModelPlant:
     def renewed(self, generator: np.random.Generator) -> ModelPlant:  # noqa: ARG002
         """Return the film unchanged: nothing in a model is random."""
         return self
+
+    def in_room(self, air: Air) -> ModelPlant:
+        """See ``Plant.in_room``; a model without an effect of the room is left as it is."""
+        if not any(EFFECTS[name].needs for name, _ in self.actuator.effects):
+            return self
+        return ModelPlant.at_rest(self.actuator, air)
 
     def advance(
         self, time: np.ndarray, voltage: np.ndarray, hold: bool
@@ -54,7 +72,7 @@ class ModelPlant:
         if not self.failed:
             state = self.state.copy()
             status, reached, _ = kernel.drive_by_voltage(
-                self.coefficients, time, voltage, ends_of(voltage, hold), np.zeros(0),
+                self.coefficients, time, voltage, ends_of(voltage, hold), self._air(time),
                 state, stretch, rate,
             )  # fmt: skip
             if status != kernel.OK:
@@ -77,3 +95,22 @@ class ModelPlant:
             fault_at=fault_at,
         )
         return motion, after
+
+    def _air(self, time: np.ndarray) -> np.ndarray:
+        """Return the air at ``time`` (N,) s above that of the start, as the kernel takes it."""
+        if self.air is None:
+            return NO_AIR
+        start = np.zeros(1)
+        warmth = self.air.temperature(time) - self.air.temperature(start)
+        moisture = 0.01 * (self.air.humidity(time) - self.air.humidity(start))
+        return np.stack((warmth, moisture))
+
+
+def _start(air: Air) -> Drive:
+    """Return a drive at 0 V that begins in ``air``."""
+    start = np.zeros(1)
+    return Drive(
+        np.arange(2.0), np.zeros(2),
+        temperature=float(air.temperature(start)[0]) - CELSIUS,
+        humidity=0.01 * float(air.humidity(start)[0]) - HUMIDITY,
+    )  # fmt: skip

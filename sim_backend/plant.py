@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-__all__ = ["Motion", "Plant"]
+__all__ = ["Air", "Motion", "Plant"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,18 @@ class Motion:
     fault_at: int = 0
 
 
+class Air(Protocol):
+    """Air of the room over s from the start of a run, any shape; earlier times are its past."""
+
+    def temperature(self, at: np.ndarray) -> np.ndarray:
+        """Return the temperature in degrees Celsius."""
+        ...
+
+    def humidity(self, at: np.ndarray) -> np.ndarray:
+        """Return the relative humidity in per cent."""
+        ...
+
+
 class Plant(Protocol):
     """A film with its present state. It is immutable: ``advance`` returns the film afterwards.
 
@@ -42,6 +54,10 @@ class Plant(Protocol):
 
     def renewed(self, generator: np.random.Generator) -> Plant:
         """Return the film at rest for another run, with the effects that vary by run redrawn."""
+        ...
+
+    def in_room(self, air: Air) -> Plant:
+        """Return the film at rest in the ``air`` of its next run."""
         ...
 
     def advance(self, time: np.ndarray, voltage: np.ndarray, hold: bool) -> tuple[Motion, Plant]:

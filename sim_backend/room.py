@@ -11,7 +11,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -62,24 +61,22 @@ class Air:
 
     def temperature(self, at: np.ndarray) -> np.ndarray:
         """Return the temperature in degrees Celsius."""
+        return np.asarray(self.settings.temperature_degC + self.temperature_change(at))
+
+    def temperature_change(self, at: np.ndarray) -> np.ndarray:
+        """Return the temperature above its mean in K."""
         s = self.settings
-        changes = self._changes(at, s.daily_K, s.heating_K, s.weather_K, 0)
-        return np.asarray(s.temperature_degC + changes)
+        return self._changes(at, s.daily_K, s.heating_K, s.weather_K, 0)
 
     def humidity(self, at: np.ndarray) -> np.ndarray:
         """Return the relative humidity in per cent: lower where it is warmer."""
-        s = self.settings
-        changes = self._changes(at, s.daily_percent, s.heating_percent, s.weather_percent, 1)
-        return np.clip(s.relative_humidity_percent - changes, 0.0, 100.0)
+        mean = self.settings.relative_humidity_percent
+        return np.clip(mean + self.humidity_change(at), 0.0, 100.0)
 
-    @cached_property
-    def steady(self) -> bool:
-        """True where nothing changes."""
+    def humidity_change(self, at: np.ndarray) -> np.ndarray:
+        """Return the relative humidity above its mean in per cent: negative where it is warmer."""
         s = self.settings
-        return not any(
-            (s.daily_K, s.heating_K, s.weather_K, s.daily_percent, s.heating_percent,
-             s.weather_percent)
-        )  # fmt: skip
+        return -self._changes(at, s.daily_percent, s.heating_percent, s.weather_percent, 1)
 
     def _changes(
         self, at: np.ndarray, daily: float, heating: float, weather: float, which: int

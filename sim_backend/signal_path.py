@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dearig.drivers.channels import HUMIDITY
 from dearig.drivers.rig import Event
 from dearig.drivers.settings import RigSettings, ThermometerSettings
 from dearig.sim_backend.amplifier import Amplifier, AmplifierRows, AmplifierState
@@ -16,6 +17,7 @@ from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.laser import Laser, LaserRows, LaserState
 from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.plant import Motion, Plant
+from dearig.sim_backend.room import Air
 from dearig.sim_backend.streams import Streams
 
 __all__ = ["CHUNK", "PathState", "SignalPath"]
@@ -54,7 +56,7 @@ class PathState:
 class SignalPath:
     """Signal path in one run at ``rate`` Hz with ``faults``; the state is passed in and out.
 
-    It is computed in chunks of ``chunk`` samples.
+    It is computed in chunks of ``chunk`` samples; ``air`` is that of the room.
     """
 
     def __init__(
@@ -67,8 +69,10 @@ class SignalPath:
         faults: FaultPlan | None = None,
         noise: str = WHITE,
         chunk: int = CHUNK,
+        air: Air | None = None,
     ) -> None:
         self._chunk = chunk
+        self._air = air or Air(settings.room)
         self._settings = settings
         self._rate = rate
         self._faults = faults or FaultPlan()
@@ -85,7 +89,7 @@ class SignalPath:
 
     def start(self, plant: Plant) -> PathState:
         """Return the state before the first sample, with ``plant`` redrawn for this run."""
-        plant = plant.renewed(self._streams.before_run("film", self._run))
+        plant = plant.renewed(self._streams.before_run("film", self._run)).in_room(self._air)
         return PathState(plant, AmplifierState(), self._laser.start())
 
     def advance(
@@ -138,12 +142,14 @@ class SignalPath:
         counts[3], stuck = self._stick(
             self._card.convert("displacement", reading.volts), first, state.stuck
         )
+        times = (first + np.arange(samples)) / self._rate
         if self._settings.thermometer is not None:
             at, _ = self._converted("temperature", samples)
-            counts[4] = self._temperature(self._settings.thermometer, motion.heating[at], chunk)
+            warming = motion.heating[at] + self._air.temperature_change(times)
+            counts[4] = self._temperature(self._settings.thermometer, warming, chunk)
         declared = self._settings.channel
         if declared:
-            counts[-len(declared) :] = self._declared(chunk, samples)
+            counts[-len(declared) :] = self._declared(chunk, times)
 
         events = [
             *self._amplifier_events(first, rows.settled, state.settled),
@@ -266,17 +272,21 @@ class SignalPath:
         volts = (celsius - thermometer.celsius_at_0_V) / thermometer.celsius_per_V
         return self._card.convert("temperature", volts)
 
-    def _declared(self, chunk: int, samples: int) -> np.ndarray:
-        """Return counts (channels, samples) of the channels that the rig file declares."""
+    def _declared(self, chunk: int, times: np.ndarray) -> np.ndarray:
+        """Return counts (channels, n) at ``times`` (n,) s of the rig file's channels.
+
+        The one of the relative humidity follows the room.
+        """
         channels = self._settings.channel
         noise = self._streams.of_chunk("channels", self._run, chunk)
-        drawn = noise.standard_normal((len(channels), self._chunk))[:, :samples]
-        return np.array(
-            [
-                self._card.convert(c.name, c.volts(c.simulated_value + c.simulated_noise * row))
-                for c, row in zip(channels, drawn, strict=True)
-            ]
-        )
+        drawn = noise.standard_normal((len(channels), self._chunk))[:, : times.size]
+        counts = []
+        for channel, row in zip(channels, drawn, strict=True):
+            values = channel.simulated_value + channel.simulated_noise * row
+            if channel.name == HUMIDITY:
+                values = values + self._air.humidity_change(times)
+            counts.append(self._card.convert(channel.name, channel.volts(values)))
+        return np.array(counts)
 
     def _amplifier_events(self, first: int, settled: np.ndarray, before: bool) -> list[Event]:
         return [

@@ -12,7 +12,7 @@ import numpy as np
 from dearig.drivers.channels import Channel
 from dearig.drivers.rig import Block
 from dearig.model import kernel
-from dearig.model.actuator import STATUS_WORDS, Actuator, at_rest, initial_state
+from dearig.model.actuator import NO_AIR, STATUS_WORDS, Actuator, at_rest, initial_state
 from dearig.model.effects import SENSOR_MEMORY
 from dearig.model.errors import ModelError
 from dearig.model.sensor import at_sensor
@@ -104,14 +104,14 @@ class Overlay:
         voltage[:first] = self._voltage
         voltage[first:] = self._scaling.physical(block.counts[self._row])
         self._voltage = float(voltage[-1])
-        rise = np.zeros(0)
+        air = NO_AIR
         if self._thermometer is not None:
             scaling = self._channels[self._thermometer].scaling
             now = self._temperature_rise.after(scaling.physical(block.counts[self._thermometer]))
-            rise = np.full(time.size, now)
+            air = np.stack((np.full(time.size, now), np.zeros(time.size)))
         stretch, speed = np.empty(time.size), np.empty(time.size)
         status, reached, _ = kernel.drive_by_voltage(
-            self._coefficients, time, voltage, voltage, rise, self._state, stretch, speed
+            self._coefficients, time, voltage, voltage, air, self._state, stretch, speed
         )
         moved = (stretch - self._rest) * self._length
         out = self._sensed(time[first:], moved[first:], speed[first:] * self._length)

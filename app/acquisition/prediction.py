@@ -10,7 +10,7 @@ import numpy as np
 from dearig.drivers.gate import Limits
 from dearig.drivers.samples import Repeated, Samples
 from dearig.model import kernel
-from dearig.model.actuator import STATUS_WORDS, Actuator, at_rest, initial_state
+from dearig.model.actuator import NO_AIR, STATUS_WORDS, Actuator, at_rest, initial_state
 from dearig.model.effects import SENSOR_MEMORY
 from dearig.model.kinematics import thinning
 
@@ -139,7 +139,7 @@ class PredictedFilm:
         voltage = np.append(peaks, peaks[-1])
         stretch, speed = np.empty(time.size), np.empty(time.size)
         status, reached, _ = kernel.drive_by_voltage(
-            c, time, voltage, voltage, np.zeros(0), self._state, stretch, speed
+            c, time, voltage, voltage, NO_AIR, self._state, stretch, speed
         )
         reading, velocity = (stretch - self._rest) * self._length, speed * self._length
         kernel.read_sensor(c, time, reading, velocity, self._memory)

@@ -32,6 +32,7 @@ from dearig.analysis.outcomes import (
 from dearig.analysis.quality import check_enough, extrapolated, few_data, inspect
 from dearig.analysis.records import (
     Source,
+    air_sentences_of,
     as_record,
     check_named_once,
     compare,
@@ -308,6 +309,7 @@ def _prepared(
         for sentence in inspect(r, settings.drive, to_fit=r in recordings).findings
     ]
     said += noise_sentences((*recordings, *others))
+    said += air_sentences_of(recordings)
     said += extrapolated(recordings, others, settings.drive)
     films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
     if len(films) > 1:

@@ -18,6 +18,7 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator, Drive
 from dearig.model.denoise import quieted, reading_noise
+from dearig.model.environment import CELSIUS, HUMIDITY, air_sentences
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Lobes
 from dearig.model.film import Strip
@@ -35,6 +36,7 @@ from dearig.recording.rest_noise import MIN_QUIET, ReadingNoise
 __all__ = [
     "PUBLISHED_FIT",
     "Source",
+    "air_sentences_of",
     "as_record",
     "check_named_once",
     "compare",
@@ -191,24 +193,49 @@ def _bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> 
 def recording_drive(recording: Recording, drive: str) -> Drive:
     """Return the voltage of a recording: the command, or the monitor's reading.
 
-    A voltage that was read is smoothed to remove the reading's noise. With a thermometer, the
-    temperature above that of the first second is included, as a mean over a second.
+    A voltage that was read is smoothed to remove the reading's noise. The air of the room is
+    included where it was recorded: its temperature and humidity above those of the first second, as
+    means over a second, and those of the first second.
     """
     voltage = driven_by(recording, drive)
-    warmth = None
-    if recording.temperature is not None:
-        start = recording.time < recording.time[0] + _THERMOMETER
-        samples = max(int(np.count_nonzero(start)), 1)
-        warmth = uniform_filter1d(recording.temperature, samples, mode="nearest")
-        warmth -= float(recording.temperature[start].mean())
+    warmth, temperature = _air(recording, "temperature_degC", 1.0, CELSIUS)
+    moisture, humidity = _air(recording, "relative_humidity_percent", 0.01, HUMIDITY)
     try:
         volts = _present(voltage)
         noise = reading_noise(volts)
         if noise > 0.0:
             volts = quieted(volts, noise)
-        return Drive(recording.time, volts, recording.hold, warmth)
+        return Drive(recording.time, volts, recording.hold, warmth, moisture, temperature, humidity)
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error
+
+
+def _air(
+    recording: Recording, name: str, scale: float, reference: float
+) -> tuple[np.ndarray | None, float | None]:
+    """Return ``name`` of the room above that of the first second (N,), and that less a reference.
+
+    Each None where it was not recorded; ``scale`` makes the model's unit of the recording's.
+    """
+    values = recording.room(name)
+    if values is None:
+        return None, None
+    start = recording.time < recording.time[0] + _THERMOMETER
+    samples = max(int(np.count_nonzero(start)), 1)
+    first = float(values[start].mean())
+    changes = uniform_filter1d(values, samples, mode="nearest") - first
+    return scale * changes, scale * first - reference
+
+
+def air_sentences_of(recordings: Sequence[Recording]) -> list[str]:
+    """Return why what films owe to the recorded air of the room cannot be looked for."""
+    driven = [r for r in recordings if r.kind == "actuator"]
+    return list(
+        air_sentences(
+            [_air(r, "temperature_degC", 1.0, CELSIUS)[1] for r in driven],
+            [_air(r, "relative_humidity_percent", 0.01, HUMIDITY)[1] for r in driven],
+        )
+    )
 
 
 def _present(values: np.ndarray | None) -> np.ndarray:

@@ -21,6 +21,7 @@ from dearig.acquisition.run import RunObserver
 from dearig.drivers.channels import CHANNEL_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.model.control import HoldAnswer
+from dearig.drivers.thermohygrometer import RoomReading
 from dearig.model.errors import ModelError
 from dearig.recording.rest_noise import lead_in
 from dearig.window.traces import ErrorsSoFar, Newest, Pyramid, RunningErrors
@@ -93,6 +94,7 @@ class Live(RunObserver):
         self._answers: list[tuple[float, HoldAnswer]] = []
         self._answered, self._stride = 0, 1  # answers that came; every so many are kept
         self.last_answer: HoldAnswer | None = None  #: of a feedback
+        self._room: tuple[float, RoomReading] | None = None
         self._thread: threading.Thread | None = None
 
     # called from the rig's thread
@@ -120,6 +122,10 @@ class Live(RunObserver):
             if len(self._answers) > _ANSWERS_MAX:
                 self._answers, self._stride = self._answers[::2], 2 * self._stride
 
+    def room(self, time: float, reading: RoomReading) -> None:
+        with self._lock:
+            self._room = time, reading
+
     # called from the interface thread
 
     def answers(self) -> np.ndarray:
@@ -132,6 +138,11 @@ class Live(RunObserver):
         """Use other overlay models; they are simulated from the start of the run."""
         self._wanted = (tuple(overlays), drive)
         self._inbox.put(self._wanted)
+
+    def newest_room(self) -> tuple[float, RoomReading] | None:
+        """Return the newest reading of the room and its time in the run in s; None without one."""
+        with self._lock:
+            return self._room
 
     def take_events(self) -> list[LiveEvent]:
         """Return the events since the last call."""

@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt, Slot
 from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
+from dearig.drivers.thermohygrometer import RoomReading
 from dearig.window.hv import HighVoltageBadge
 from dearig.window.hv_bar import label_stop, stop_button
 from dearig.window.hv_status import HighVoltageStatus
@@ -95,6 +96,8 @@ class RunControls(QWidget):
         column.addStretch(1)
         self.setFixedWidth(_WIDTH)
         status.changed.connect(self._refresh)
+        session.rig_changed.connect(self._rig_changed)
+        self._rig_changed()
         self._refresh()
 
     @Slot()
@@ -125,6 +128,23 @@ class RunControls(QWidget):
             ):
                 self.numbers[f"{name} {place}"].show_number(value, 2)
 
+    def show_room(self, newest: tuple[float, RoomReading] | None, seconds: float) -> None:
+        """Show the newest reading of the room at ``seconds`` of the run, with its age."""
+        celsius = percent = float("nan")
+        words = "Room"
+        if newest is not None:
+            taken, reading = newest
+            celsius, percent = reading.temperature, reading.humidity
+            age = max(seconds - taken, 0.0)
+            words = f"Room, {age:.0f} s ago" if reading.known else "Room: no value"
+        self.room_title.setText(words)
+        self.numbers["temperature"].show_number(celsius, 1)
+        self.numbers["humidity"].show_number(percent, 1)
+
+    @Slot()
+    def _rig_changed(self) -> None:
+        self._room_group.setVisible(self._session.rig_file.thermohygrometer is not None)
+
     def show_models(self) -> None:
         """Show one group of errors for each overlay model of the session."""
         overlays = self._session.overlays
@@ -150,6 +170,20 @@ class RunControls(QWidget):
         }
         for readout in self.numbers.values():
             column.addWidget(readout)
+        self.room_title = label("Room", "heading", "Readings of the thermo-hygrometer")
+        room = QVBoxLayout()
+        room.setContentsMargins(0, 4, 0, 0)
+        room.setSpacing(0)
+        room.addWidget(self.room_title)
+        for name, words, unit, tip in (
+            ("temperature", "Temperature", "°C", "Temperature of the room, measured, in °C"),
+            ("humidity", "Humidity", "%", "Relative humidity of the room, measured, in %"),
+        ):
+            self.numbers[name] = Readout(words, unit, tip, 13)
+            room.addWidget(self.numbers[name])
+        self._room_group = QWidget()
+        self._room_group.setLayout(room)
+        column.addWidget(self._room_group)
         self._model_titles, self._model_groups = [], []
         for place in (0, 1):
             group = QVBoxLayout()

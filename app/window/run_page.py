@@ -215,6 +215,7 @@ class RunPage(QWidget):
         if now is None:
             return
         self.controls.show_numbers(now)
+        self.controls.show_room(live.newest_room(), now.samples / now.rate)
         failures = [
             f"{model.name}: {reason}"
             for model, reason in zip(self.session.overlays, now.words, strict=False)

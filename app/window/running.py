@@ -20,6 +20,7 @@ from dearig.acquisition.run import RunObserver, RunOptions, RunResult, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.drivers.rig import Block, Event, RigIdentity
+from dearig.drivers.thermohygrometer import RoomReading
 from dearig.errors import (
     DearigError,
     DiskFault,
@@ -268,6 +269,9 @@ class _Observed(RunObserver):
 
     def answered(self, time: float, answer: HoldAnswer) -> None:
         self._live.answered(time, answer)
+
+    def room(self, time: float, reading: RoomReading) -> None:
+        self._live.room(time, reading)
 
     def event(self, event: Event) -> None:
         self._live.event(event)

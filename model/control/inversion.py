@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_closing, binary_dilation
 
-from dearig.model.actuator import STATUS_WORDS, Actuator, Drive, at_rest, reading_of
+from dearig.model.actuator import NO_AIR, STATUS_WORDS, Actuator, Drive, at_rest, reading_of
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, MODULUS, WIDTH
 from dearig.model.control.bands import low_pass
 from dearig.model.control.linear import level_of, linearise, repeatable_part
@@ -254,7 +254,7 @@ class _Job:
 
     def _carried(self, c: np.ndarray, voltage: np.ndarray, motion: np.ndarray) -> np.ndarray:
         out = np.empty(self.time.size)
-        carried_stress(c, self.time, voltage, voltage, _NOTHING, motion, out, _NOTHING)
+        carried_stress(c, self.time, voltage, voltage, NO_AIR, motion, out, _NOTHING)
         return out
 
     def follow(self, u: np.ndarray) -> _Pass:

@@ -13,6 +13,7 @@ from dearig.model.diagnosis.race import Candidate, race
 from dearig.model.diagnosis.regression import Regression, is_unseen
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS
+from dearig.model.environment import recorded_of
 from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["MUCH_LESS", "Found", "Race", "Search"]
@@ -80,14 +81,15 @@ class Search:
         self._left_out: set[tuple[frozenset[str], str]] = set()
         self._searching, self._done = False, 0.0
         drive = "voltage" if fitter.of_actuator else "stretch"
-        warm = any(
-            isinstance(r, ActuatorRecord) and r.drive.warmth is not None for r in fitter.full
-        )
-        # drift of one record is noise here; a thermometer's effect needs a thermometer
+        drives = [r.drive for r in fitter.full if isinstance(r, ActuatorRecord)]
+        there = set(recorded_of([d.temperature for d in drives], [d.humidity for d in drives]))
+        if any(d.warmth is not None for d in drives):
+            there.add("temperature")
+        # drift of one record is noise here; an effect of the room needs recordings of it
         known = [
             e
             for e in EFFECTS.values()
-            if drive in e.drives and e.drift_basis is None and (warm or e.name != "temperature")
+            if drive in e.drives and e.drift_basis is None and (not e.needs or e.needs in there)
         ]
         self.effects = [e for e in known if not e.is_general]
         self.general = [e for e in known if e.is_general]

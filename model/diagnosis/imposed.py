@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from dearig.model.actuator import Actuator, at_rest
+from dearig.model.actuator import NO_AIR, Actuator, at_rest
 from dearig.model.coefficients import (
     ELECTRIC,
     FORCE,
@@ -103,7 +103,7 @@ class ImposedActuator:
         self.record, self.every = record, every
         self.length = float(c[LENGTH])
         self.c = c.copy()
-        status, self.rest = at_rest(self.c)
+        status, self.rest = at_rest(self.c, record.drive)
         if status != OK:
             raise ModelError("the model has no rest state under its load")
         self.step = _step(record)
@@ -181,9 +181,7 @@ class ImposedActuator:
     def _stress(self, c: np.ndarray) -> np.ndarray:
         """Return the stress (N,) in Pa that the springs must carry, less that at the start."""
         r, out = self.record, np.empty(self.record.time.size)
-        carried_stress(
-            c, r.time, self.voltage, self.ends, r.drive.temperature, self.motion, out, _NOTHING
-        )
+        carried_stress(c, r.time, self.voltage, self.ends, r.drive.air, self.motion, out, _NOTHING)
         return out - out[0]
 
     def target(self) -> np.ndarray:
@@ -231,7 +229,7 @@ class ImposedStrip:
         free[FORCE], loaded[FORCE] = 0.0, 1.0
         at_none, at_one = np.empty_like(none), np.empty_like(none)
         for row, out in ((free, at_none), (loaded, at_one)):
-            carried_stress(row, r.time, none, none, _NOTHING, self.motion, out, _NOTHING)
+            carried_stress(row, r.time, none, none, NO_AIR, self.motion, out, _NOTHING)
         return at_none + (at_one - at_none) * r.stress
 
     def target(self) -> np.ndarray:

@@ -72,7 +72,7 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
     c = model.coefficients()
     c[INERTIA] += assembly.inertia(assembly.active(c), c, np.zeros(MEMORY))
     c[EFFECTS_AT : EFFECTS_AT + PARAMETER_COUNT] = NEUTRAL
-    _, rest = at_rest(c)
+    _, rest = at_rest(c, record.drive)
     length = model.film.length
     width = SMOOTHING / step
 

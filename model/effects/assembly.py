@@ -30,6 +30,8 @@ __all__ = [
     "HYSTERETIC",
     "active",
     "active_sensors",
+    "at_rest",
+    "breathe",
     "commit",
     "inertia",
     "measured_stress",
@@ -205,6 +207,8 @@ HYSTERETIC = _mask(n for n, effect in EFFECTS.items() if effect.is_hysteretic)
 _hooks: Any = _load()
 _Hook = Callable[..., Any]
 
+at_rest: _Hook = _hooks.at_rest
+breathe: _Hook = _hooks.breathe
 inertia: _Hook = _hooks.inertia
 supply: _Hook = _hooks.supply
 polarise: _Hook = _hooks.polarise

@@ -19,7 +19,7 @@ import numpy as np
 
 from dearig.model import kernel
 from dearig.model.actuator import Actuator, Drive, at_rest, reading_of
-from dearig.model.coefficients import EFFECTS_AT
+from dearig.model.coefficients import AIR_HUMIDITY, AIR_TEMPERATURE, EFFECTS_AT
 from dearig.model.effects.description import Effect, Parameter, faults_of
 from dearig.model.effects.hooks import FASTEST, HOOKS
 from dearig.model.effects.registry import EFFECTS, PLACES, hook_faults
@@ -41,7 +41,9 @@ _STEP_ERROR = 0.2e-6  # m: a fifth of the sensor's repeatability
 _STEP_ERROR_PART = 0.02  # of what the effect does
 _BASIS_TOLERANCE = 1e-9  # of the largest value
 
-_PURE = ("inertia", "permittivity", "soften", "stress", "stiffness", "measured_stress")
+_AIR = (2.0, 0.1)  # K and relative humidity above the reference
+
+_PURE = ("at_rest", "inertia", "permittivity", "soften", "stress", "stiffness", "measured_stress")
 _SUPPLY = ("supply", "polarise")
 _RATES = (0.0, 1e-3, 0.01, 0.03, 0.1, 0.3, FASTEST)
 
@@ -64,7 +66,7 @@ def faults_of_effect(name: str) -> list[str]:
     faults = [*faults_of(EFFECTS[name]), *hook_faults(PLACES[name].module)]
     if not faults:
         probe = _Probe(name)
-        for check in (_values, _pure, _stiffness, _joins, _supplies, _basis):
+        for check in (_values, _pure, _stiffness, _joins, _rest, _supplies, _basis):
             faults += dict.fromkeys(check(probe))
     if not faults:
         faults += _in_simulations(name)
@@ -78,6 +80,7 @@ class _Probe:
         self.effect, self.module = EFFECTS[name], PLACES[name].module
         film = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3).coefficients()
         at_rest(film)
+        film[AIR_TEMPERATURE], film[AIR_HUMIDITY] = _AIR
         self._film = film[:EFFECTS_AT]
         self.rest = float(at_rest(film)[1])
         self.k, self.j = EFFECTS_AT + _GUARD, _GUARD
@@ -138,7 +141,7 @@ def _arguments(hook: str, probe: _Probe, step: tuple[float, float, float, float]
     lam0, lam, rate, h = step
     known = {
         "t": 1.0, "start": 5e3, "end": 6e3, "h": h, "lam": lam, "rate": rate, "lam0": lam0,
-        "since": h, "warmth": 0.5, "field2": 36e6, "sigma": -50.0, "dt": h,
+        "since": h, "warmth": 0.5, "moisture": 0.05, "field2": 36e6, "sigma": -50.0, "dt": h,
         "x": (lam / probe.rest - 1.0) * 0.08, "u": rate / probe.rest * 0.08,
     }  # fmt: skip
     return [known[name.strip()] for name in HOOKS[hook].arguments.split(",") if name]
@@ -258,6 +261,19 @@ def _joins(probe: _Probe) -> Iterator[str]:
             )
 
 
+def _rest(probe: _Probe) -> Iterator[str]:
+    """The factor at rest is that with which a record begins: else the film would move at once."""
+    if not probe.has("at_rest"):
+        return
+    for values in probe.settings():
+        c, m = probe.coefficients(values), probe.state()
+        rest, begins = probe.call("at_rest", c, m)[0], 1.0
+        if probe.has("soften"):
+            begins = probe.call("soften", c, m, probe.rest, 0.0, 0.0, 0.0)[0]
+        if not abs(rest - begins) < 1e-9:
+            yield f"its at_rest is {rest:.6g} where its soften begins with {begins:.6g}"
+
+
 def _supplies(probe: _Probe) -> Iterator[str]:
     """Steps of ``supply`` and ``polarise`` join, and asking for the present changes nothing."""
     for hook in filter(probe.has, _SUPPLY):
@@ -359,8 +375,10 @@ def _simulated(
     volts = np.where(time < 1.0, 6e3, 8e3) * np.sin(math.pi * (time % 1.0))
     volts = np.where(time < 2.0, volts, 7e3 * np.clip((time - 2.1) / 0.02, 0.0, 1.0))
     fine = np.arange(240 * finer + 1) / (100.0 * finer)
-    drive = Drive(fine, np.interp(fine, time, volts), warmth=0.1 * fine)
+    drive = Drive(
+        fine, np.interp(fine, time, volts), warmth=0.1 * fine, moisture=0.02 * fine,
+        temperature=_AIR[0], humidity=_AIR[1],
+    )  # fmt: skip
     c = model.coefficients()
-    at_rest(c)
     displacement, status = reading_of(c, model.film.length, drive, fidelity=fidelity)
     return displacement[::finer] if status == kernel.OK else np.full(time.size, math.nan)

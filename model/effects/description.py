@@ -151,6 +151,9 @@ class Effect:
     curve
         For a general law: a function of the parameters' values by name that returns the ``Curve``
         that they describe.
+    needs
+        What recordings must have beside voltage and displacement: ``temperature`` during each, or
+        ``temperatures`` or ``humidity`` of several recordings that differ in it. Empty for most.
     drift_basis
         For a drift of the reading that is linear in the amplitudes and different in every
         recording: a function of times (N,) s that returns what a unit of each amplitude adds to the
@@ -172,6 +175,7 @@ class Effect:
     is_general: bool = False
     curve: Callable[[Mapping[str, float]], Curve] | None = None
     drift_basis: Callable[[np.ndarray], np.ndarray] | None = None
+    needs: str = ""
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:
@@ -186,6 +190,7 @@ class Effect:
 
 _RELATIVE_TO = ("", "displacement", "voltage", "duration", "spectrum", "slope")
 _DRIVES = ("voltage", "stretch")
+_NEEDS = ("", "temperature", "temperatures", "humidity")
 
 
 def faults_of(effect: object) -> list[str]:
@@ -206,6 +211,8 @@ def _faults(effect: Effect) -> Iterator[str]:
         yield "it needs a name and a summary"
     if not effect.drives or not set(effect.drives) <= set(_DRIVES):
         yield f"its drives {effect.drives} are not some of {', '.join(_DRIVES)}"
+    if effect.needs not in _NEEDS:
+        yield f"its needs {effect.needs!r} is not one of {', '.join(_NEEDS[1:])}, or empty"
     names = [p.name for p in effect.parameters]
     if len(set(names)) < len(names):
         yield f"two of its parameters have one name: {', '.join(names)}"

@@ -37,8 +37,13 @@ class Hook(NamedTuple):
 
 #: Symbols: ``lam`` stretch, ``rate`` its rate in 1/s, ``t`` s since the record began, ``lam0`` the
 #: stretch at the beginning of the step, ``since`` s after that, ``h`` s length of the step,
-#: ``warmth`` K above the temperature of the start, ``field2`` V^2 the voltage squared at the film.
+#: ``warmth`` K above the temperature of the start, ``moisture`` the relative humidity above that of
+#: the start (0 to 1), ``field2`` V^2 the voltage squared at the film.
 #:
+#: * ``at_rest``: factor on the network's nominal stress before the record begins. The stretch at
+#:   rest follows from it; ``soften`` must begin with the same factor.
+#: * ``breathe``: carries the state along by ``h`` s in the air of the room; called once for each
+#:   sample, before its steps.
 #: * ``inertia`` kg/m: added to the coefficient of lam'' in the motion equation.
 #: * ``supply`` V, V: the voltage at the film when that before it goes from ``start`` to ``end`` V
 #:   in ``h`` s; carries the state along. ``lam`` and ``rate`` are those amid the step. With
@@ -60,6 +65,8 @@ class Hook(NamedTuple):
 #:   after the reading before; carries the state along. An effect with this hook has no other.
 HOOKS: Mapping[str, Hook] = MappingProxyType(
     {
+        "at_rest": Hook("", "product"),
+        "breathe": Hook("warmth, moisture, h", ""),
         "inertia": Hook("", "sum"),
         "supply": Hook("t, start, end, h, lam, rate", "start, end"),
         "polarise": Hook("start, end, h", "sums"),

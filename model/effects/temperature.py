@@ -21,6 +21,7 @@ EFFECT = Effect(
             "stiffening", "1/K", (-0.2, 0.2), "relative change of stress per kelvin", 1e-3, 0.0
         ),
     ),
+    needs="temperature",
 )
 
 

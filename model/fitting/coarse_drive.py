@@ -159,13 +159,21 @@ def _coarsened(
     """Return ``drive`` in steps between samples ``edges`` (B + 1,)."""
     time = drive.time
     starts, to = begins[edges[:-1]].copy(), ends[edges[1:] - 1].copy()
-    warmth = None if drive.warmth is None else drive.warmth[edges].copy()
+    air = drive.air[:, edges].copy() if drive.air.size else None
     sizes = np.diff(edges)
     for size in np.unique(sizes[sizes > 1]):
         which = np.flatnonzero(sizes == size)
         first = edges[which]
         starts[which], to[which], _ = _line(time, begins, ends, first, int(size))
-        if warmth is not None and drive.warmth is not None:
-            warmth[which] = drive.warmth[first[:, None] + np.arange(size)].mean(axis=1)
+        if air is not None:
+            air[:, which] = drive.air[:, first[:, None] + np.arange(size)].mean(axis=2)
     last = drive.voltage[-1]
-    return CoarseDrive(time[edges], np.append(starts, last), warmth=warmth, to=np.append(to, last))
+    return CoarseDrive(
+        time[edges],
+        np.append(starts, last),
+        warmth=None if air is None or drive.warmth is None else air[0],
+        moisture=None if air is None or drive.moisture is None else air[1],
+        temperature=drive.temperature,
+        humidity=drive.humidity,
+        to=np.append(to, last),
+    )

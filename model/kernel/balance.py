@@ -22,7 +22,7 @@ __all__ = ["carried_stress", "effect_inertia"]
 
 _supply, _polarise, _permittivity = assembly.supply, assembly.polarise, assembly.permittivity
 _soften, _stress, _commit = assembly.soften, assembly.stress, assembly.commit
-_inertia, _active = assembly.inertia, assembly.active
+_inertia, _active, _breathe = assembly.inertia, assembly.active, assembly.breathe
 
 _NEARBY = 1e-6  # of the stretch, over which the slope of the effects' stress is taken
 
@@ -39,14 +39,14 @@ def carried_stress(
     time: np.ndarray,
     voltage: np.ndarray,
     ends: np.ndarray,
-    warmth: np.ndarray,
+    air: np.ndarray,
     motion: np.ndarray,
     carried: np.ndarray,
     slope: np.ndarray,
 ) -> None:
     """Fill ``carried`` (N,) with the nominal stress in Pa that the springs must carry.
 
-    ``time`` s, ``voltage`` and ``ends`` V are (N,), ``warmth`` K is (N,) or (0,), all as in
+    ``time`` s, ``voltage`` and ``ends`` V are (N,), ``air`` is (2, N) or (2, 0), all as in
     ``drive_by_voltage``. ``motion`` (3, N) is the stretch, its rate in 1/s and its acceleration in
     1/s^2. ``c`` must know the stretch at rest. ``slope`` (N,) is filled with the derivative in Pa
     of the effects' stress with respect to the stretch; it may be (0,) where it is not needed.
@@ -54,7 +54,7 @@ def carried_stress(
     held, acting = int(c[HELD]), _active(c)
     m = np.zeros(MEMORY)
     inertia = c[INERTIA] + _inertia(acting, c, m)
-    warm, sloped = warmth.shape[0] == time.shape[0], slope.shape[0] == time.shape[0]
+    warm, sloped = air.shape[1] == time.shape[0], slope.shape[0] == time.shape[0]
     before, speed, t, h = motion[0, 0], motion[1, 0], time[0], 0.0
     last, end, now = voltage[0], voltage[0], 0.0
     for k in range(time.shape[0]):
@@ -62,6 +62,8 @@ def carried_stress(
         if k:
             t, h = time[k - 1], time[k] - time[k - 1]
             last, end = voltage[k - 1], ends[k - 1]
+            if warm and acting:
+                _breathe(acting, c, m, air[0, k - 1], air[1, k - 1], h)
         if acting == 0:
             field2 = voltage[k] * voltage[k] if k == 0 else end * end
         else:
@@ -78,7 +80,7 @@ def carried_stress(
             up = _stress(acting, c, m, lam + d, rate, before, h, t)
             down = _stress(acting, c, m, lam - d, rate, before, h, t)
             slope[k] = 0.5 * (up - down) / d
-        soft = _soften(acting, c, m, lam, h, t, warmth[k] if warm else 0.0)
+        soft = _soften(acting, c, m, lam, h, t, air[0, k] if warm else 0.0)
         carried[k] = (c[FORCE] + pull - inertia * motion[2, k] - stress) / soft
         if k:
             _commit(acting, c, m, lam, rate, before, h, t)

@@ -8,8 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, HELD, INERTIA, UNIFORM
+from dearig.model.effects import MEMORY
 from dearig.model.jit import allocating, inlined, jit
-from dearig.model.kernel.effect_forces import active_effects, added_inertia, drag_at
+from dearig.model.kernel.effect_forces import (
+    BREATHES,
+    active_effects,
+    added_inertia,
+    breathe,
+    drag_at,
+)
 from dearig.model.kernel.exponential_rk import BRANCHES_MAX, exponential_steps, film_table, is_swift
 from dearig.model.kernel.motion import admissible, rates, reason_to_fail, spring_table
 from dearig.model.kernel.propagator import (
@@ -187,7 +194,7 @@ def _follow(
     time: np.ndarray,
     voltage: np.ndarray,
     ends: np.ndarray,
-    warmth: np.ndarray,
+    air: np.ndarray,
     y: np.ndarray,
     stretch: np.ndarray,
     rate: np.ndarray,
@@ -198,7 +205,9 @@ def _follow(
     springs, branches, trace = room.springs, room.branches, room.trace
     before = room.before
     carried = y.shape[0] if policy.acting else 1 + springs.shape[1]
-    warm = warmth.shape[0] == samples
+    warm = air.shape[1] == samples
+    breathes = warm and policy.acting & BREATHES != 0
+    memory = y[y.shape[0] - MEMORY :]
     film = stiffness_at(policy, acting, c, y, time[0], branches)
     grain = STIFFNESS_NEAR * max(film.springs, 1.0)
     field_gain = c[ELECTRIC] / c[INERTIA]
@@ -230,8 +239,10 @@ def _follow(
             jump_before = jump
             jump = v1 * v1 - last * last - sloped
             jump *= field_gain * electric(held, y[0])
+            theta = air[0, k] if warm else 0.0
+            if breathes:
+                breathe(policy.acting, c, memory, theta, air[1, k], dt)
             _copy(y, before, carried)
-            theta = warmth[k] if warm else 0.0
             # a slow staircase rings within each of its long treads, but does not ring on
             treads = v0 != last and pace.calm_steps > 1
             if policy.exponential:
@@ -298,7 +309,7 @@ def drive_by_voltage(
     time: np.ndarray,
     voltage: np.ndarray,
     ends: np.ndarray,
-    warmth: np.ndarray,
+    air: np.ndarray,
     y: np.ndarray,
     stretch: np.ndarray,
     rate: np.ndarray,
@@ -308,8 +319,9 @@ def drive_by_voltage(
 
     ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. From each sample to
     the next the voltage goes linearly to that in ``ends`` (N,), from where it may jump: for a
-    converter's output, which stands until the next sample, that is ``voltage`` itself. ``warmth``
-    (N,) K is the temperature above that of the start, or (0,) where none was recorded.
+    converter's output, which stands until the next sample, that is ``voltage`` itself. ``air``
+    (2, N) is the temperature in K and the relative humidity (0 to 1) of the room above those of the
+    start, or (2, 0) where none were recorded.
     ``fidelity`` is ``CAREFUL``, ``QUICK``, ``ROUGH`` or ``COARSE``. ``c`` must know the stretch at
     rest (``dearig.model.actuator.at_rest``). ``stretch`` and ``rate`` (N,) are filled; element 0 is
     the state as given, so that a record can be cut and continued.
@@ -334,4 +346,4 @@ def drive_by_voltage(
         y.copy(),
         np.zeros(5),
     )
-    return _follow(policy, acting, c, time, voltage, ends, warmth, y, stretch, rate, room)
+    return _follow(policy, acting, c, time, voltage, ends, air, y, stretch, rate, room)

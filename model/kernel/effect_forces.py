@@ -14,6 +14,7 @@ from dearig.model.jit import inlined, jit
 from dearig.model.network import branch_count
 
 __all__ = [
+    "BREATHES",
     "COMMIT",
     "DRAGS",
     "HYSTERETIC",
@@ -22,6 +23,7 @@ __all__ = [
     "active_effects",
     "added_inertia",
     "affected",
+    "breathe",
     "commit",
     "drag_at",
     "softening_stiffness",
@@ -33,13 +35,13 @@ __all__ = [
 _supply, _polarise, _permittivity = assembly.supply, assembly.polarise, assembly.permittivity
 _soften, _stress, _stiffness = assembly.soften, assembly.stress, assembly.stiffness
 active_effects, added_inertia = assembly.active, assembly.inertia
-commit = assembly.commit
+commit, breathe = assembly.commit, assembly.breathe
 
 _SUPPLY, _POLARISE = assembly.HOOK_BITS["supply"], assembly.HOOK_BITS["polarise"]
 _PERMITTIVITY, _STRESS = assembly.HOOK_BITS["permittivity"], assembly.HOOK_BITS["stress"]
 #: Bits of the effects that take part in the motion; of those that soften the network; of those that
 #: say how stiff they are or how they drag; of those with an internal state to advance; of those
-#: that depend on turning points.
+#: that depend on turning points; of those that follow the air of the room.
 SOFTENS = assembly.HOOK_BITS["soften"]
 MOVING = _SUPPLY | _POLARISE | _PERMITTIVITY | SOFTENS | _STRESS
 DRAGS, COMMIT, HYSTERETIC = (
@@ -47,6 +49,8 @@ DRAGS, COMMIT, HYSTERETIC = (
     assembly.HOOK_BITS["commit"],
     assembly.HYSTERETIC,
 )
+
+BREATHES = assembly.HOOK_BITS["breathe"]
 
 _NEARBY = 1e-4  # of the stretch: the difference by which a stiffness is taken
 

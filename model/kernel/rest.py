@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, KIND, LOCKING, MODULUS
+from dearig.model.effects import assembly
 from dearig.model.jit import jit
 from dearig.model.kernel.motion import STRETCH_MAX, strain_at
 from dearig.model.kernel.status import NO_REST, OK, PULL_IN
@@ -13,17 +14,22 @@ from dearig.model.network import HEAD, nominal_pull, shape_at
 
 __all__ = ["rest_stretch"]
 
+_at_rest, _active = assembly.at_rest, assembly.active
+
 
 @jit
 def rest_stretch(c: np.ndarray, field2: float) -> tuple[int, float]:
     """Return ``(status, stretch)`` at rest under the load and voltage squared ``field2`` in V^2.
 
-    The branches carry nothing at rest, so only the equilibrium spring counts. The first root of the
-    balance, which is the stable one, is bracketed from the undeformed film outwards and bisected.
+    The branches carry nothing at rest, so only the equilibrium spring counts, with what effects
+    make of it in the air of the room. The first root of the balance, which is the stable one, is
+    bracketed from the undeformed film outwards and bisected.
     ``NO_REST`` without a load-bearing spring, ``PULL_IN`` when the field leaves no stable stretch.
     """
     held = int(c[HELD])
-    kind, modulus = int(c[HEAD + KIND]), c[HEAD + MODULUS]
+    kind = int(c[HEAD + KIND])
+    # no state has moved yet: the hook is given none
+    modulus = c[HEAD + MODULUS] * _at_rest(_active(c), c, c[:0])
     shape, locking = shape_at(c, HEAD), c[HEAD + LOCKING]
     if not (modulus > 0.0 and c[FORCE] >= 0.0 and field2 >= 0.0):
         return NO_REST, 1.0

@@ -20,6 +20,7 @@ from dearig.sim_backend.truth.effects import (
     electrode_resistance,
     end_stop,
     friction,
+    humidity,
     interference,
     leakage,
     load_inertia,
@@ -43,6 +44,7 @@ __all__ = [
     "FORMS",
     "HANDS",
     "KINDS",
+    "ROOM_FORMS",
     "SECOND_FORMS",
     "UNKNOWN",
     "TruthCase",
@@ -108,6 +110,15 @@ FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
         ),
     }
 )
+#: Forms that follow the air of the simulated room. They are drawn only where they are asked for by
+#: name, so that what an address without that name hides never changes.
+ROOM_FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
+    {
+        "humidity": (humidity.plasticised, humidity.swollen, humidity.losing_contact),
+        "weather": (thermal.weathered,),
+    }
+)
+
 #: Forms of the second hand: published laws that neither the model nor the first hand has.
 SECOND_FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
     {
@@ -234,7 +245,7 @@ def _drawn_families(generator: np.random.Generator, kind: str, hand: str) -> lis
         kind = str(generator.choice(list(KINDS), p=list(KINDS.values())))
     if kind == "clean":
         return []
-    if kind in HANDS[hand]:
+    if kind in HANDS[hand] or kind in ROOM_FORMS:
         return [kind]
     # in the order of the table, which is that of the signal path
     covered = _covered(hand)
@@ -253,7 +264,8 @@ def draw(
 ) -> TruthCase:
     """Return the case of ``seed``.
 
-    ``kind`` is ``any``, one of ``KINDS``, or a family of the hand's forms; raises ``ValueError``
+    ``kind`` is ``any``, one of ``KINDS``, a family of the hand's forms, or one of ``ROOM_FORMS``:
+    what follows the air of the simulated room. Raises ``ValueError``
     for any other. The film of a seed is the same for every kind, hand and noise.
 
     ``hand`` ``"second"`` draws from ``SECOND_FORMS``: published laws that the model does not have,
@@ -264,9 +276,9 @@ def draw(
         raise ValueError(f"no hand {hand!r}: choose one of {', '.join(HANDS)}")
     if noise not in NOISES:
         raise ValueError(f"no noise {noise!r}: choose one of {', '.join(NOISES)}")
-    forms = HANDS[hand]
+    forms = {**HANDS[hand], **ROOM_FORMS}
     if kind not in ("any", *KINDS, *forms):
-        offered = ", ".join(("any", *KINDS, *_covered(hand)))
+        offered = ", ".join(("any", *KINDS, *_covered(hand), *ROOM_FORMS))
         raise ValueError(f"no case of kind {kind!r}: choose one of {offered}")
     generator = np.random.default_rng(seed)
     network = _drawn_network(generator)
@@ -287,16 +299,20 @@ def address_of(seed: int, hand: str = "first", noise: str = WHITE) -> str:
 
 
 def case_of(seed: int, words: Sequence[str], film: Film, load: Load) -> TruthCase:
-    """Return the case of ``seed`` of any kind with a hand and a noise given by ``words``.
+    """Return the case of ``seed`` with a hand, a noise and a kind given by ``words``.
 
-    Raises ``ValueError`` for a word that is neither, or for two of one sort.
+    The kind is one of ``ROOM_FORMS``, or any. Raises ``ValueError`` for a word that is none of
+    them, or for two of one sort.
     """
     hands = [word for word in words if word in HANDS]
     noises = [word for word in words if word in NOISES]
-    other = [word for word in words if word not in HANDS and word not in NOISES]
-    if other or len(hands) > 1 or len(noises) > 1:
+    rooms = [word for word in words if word in ROOM_FORMS]
+    other = [word for word in words if word not in (*hands, *noises, *rooms)]
+    if other or max(len(hands), len(noises), len(rooms)) > 1:
         raise ValueError(
-            f"behind the seed stand one of {', '.join(HANDS)} and one of {', '.join(NOISES)}, not "
-            f"{':'.join(words)}"
+            f"behind the seed stand one of {', '.join(HANDS)}, one of {', '.join(NOISES)} and "
+            f"one of {', '.join(ROOM_FORMS)}, not {':'.join(words)}"
         )
-    return draw(seed, film, load, hand=(*hands, "first")[0], noise=(*noises, WHITE)[0])
+    return draw(
+        seed, film, load, (*rooms, "any")[0], hand=(*hands, "first")[0], noise=(*noises, WHITE)[0]
+    )

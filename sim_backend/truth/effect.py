@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.model.material import Load
+from dearig.sim_backend.plant import Air
 from dearig.sim_backend.truth.film import FilmNumbers
 
 __all__ = ["Course", "Draw", "Stage", "TruthEffect"]
@@ -36,7 +37,8 @@ class TruthEffect:
     * ``on_voltage``: a stage on the voltage (N,) V at the film, held from node to node;
     * ``on_motion``: a stage on what the sensor sees, rows (2, N): displacement m, velocity m/s.
 
-    ``redrawn`` draws the effect for another run, where a part of it differs between runs.
+    ``redrawn`` draws the effect for another run, where a part of it differs between runs;
+    ``in_room`` gives it for a run in some air, where it follows from that.
     """
 
     family: str
@@ -47,6 +49,7 @@ class TruthEffect:
     on_voltage: Stage | None = None
     on_motion: Stage | None = None
     redrawn: Callable[[np.random.Generator], TruthEffect] | None = None
+    in_room: Callable[[Air], TruthEffect] | None = None
 
 
 #: Function that draws one form of an effect for a film under the load.

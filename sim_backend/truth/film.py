@@ -226,6 +226,14 @@ class FilmNumbers:
             self, hidden=self.hidden._replace(further=self.hidden.further._replace(**numbers))
         )
 
+    def stiffened(self, factor: float) -> FilmNumbers:
+        """Return the film with all moduli multiplied by ``factor``."""
+        return replace(self, moduli=tuple(factor * modulus for modulus in self.moduli))
+
+    def permitting(self, factor: float) -> FilmNumbers:
+        """Return the film with its permittivity multiplied by ``factor``."""
+        return replace(self, electric=factor * self.electric, capacitance=factor * self.capacitance)
+
     def stepping(self, step: float) -> FilmNumbers:
         """Return the film with integration steps of at most ``step`` s."""
         return replace(self, step=min(self.step, step))

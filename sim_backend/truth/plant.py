@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dearig.sim_backend.plant import Motion
+from dearig.sim_backend.plant import Air, Motion
 from dearig.sim_backend.truth.effect import Course, Stage, TruthEffect
 from dearig.sim_backend.truth.film import (
     COURSE_ELECTRIC,
@@ -64,6 +64,13 @@ class TruthPlant:
     def renewed(self, generator: np.random.Generator) -> TruthPlant:
         """See ``dearig.sim_backend.plant.Plant.renewed``."""
         effects = [e if e.redrawn is None else e.redrawn(generator) for e in self.effects]
+        return TruthPlant.at_rest(self.plain, effects)
+
+    def in_room(self, air: Air) -> TruthPlant:
+        """See ``dearig.sim_backend.plant.Plant.in_room``."""
+        if all(effect.in_room is None for effect in self.effects):
+            return self
+        effects = [e if e.in_room is None else e.in_room(air) for e in self.effects]
         return TruthPlant.at_rest(self.plain, effects)
 
     @property

@@ -97,7 +97,7 @@ def simulated(c: np.ndarray, drive: Drive, fidelity: int = kernel.CAREFUL) -> np
     y = initial_state(c, c[REST])
     stretch, rate = np.empty(drive.time.size), np.empty(drive.time.size)
     kernel.drive_by_voltage(
-        c, drive.time, drive.voltage, drive.ends, drive.temperature, y, stretch, rate, fidelity
+        c, drive.time, drive.voltage, drive.ends, drive.air, y, stretch, rate, fidelity
     )
     return stretch
 

@@ -60,6 +60,7 @@ class Course:
 
     breaks = (0.0, 1.0, 1.49, 1.51, 2.0, 2.1, 2.12)
     end = 2.4
+    temperature, humidity = 2.0, -0.1  # of the room at the start
 
     def __call__(self, t):
         if t < 2.0:
@@ -69,12 +70,18 @@ class Course:
     def warmth(self, t):
         return 0.1 * t
 
+    def moisture(self, t):
+        return 0.02 * t
+
     def drive(self, rate, finer=1):
         """Sampled at ``rate``, or straight between these samples in ``finer`` steps."""
         time = np.arange(round(self.end * rate) + 1) / rate
         volts = np.array([self(t) for t in time])
         fine = np.arange(round(self.end * rate) * finer + 1) / (rate * finer)
-        return Drive(fine, np.interp(fine, time, volts), warmth=self.warmth(fine))
+        return Drive(
+            fine, np.interp(fine, time, volts), warmth=self.warmth(fine),
+            moisture=self.moisture(fine), temperature=self.temperature, humidity=self.humidity,
+        )  # fmt: skip
 
 
 COURSE = Course()
@@ -500,7 +507,7 @@ def test_a_run_in_two_pieces_is_the_run(name):
     drive = COURSE.drive(500.0)
     whole = model.simulate(drive).displacement
     c = model.coefficients()
-    _, rest = at_rest(c)
+    _, rest = at_rest(c, drive)
     for cut in (333, 757, 1055):
         y, memory = initial_state(c, rest), np.zeros(SENSOR_MEMORY)
         joined = np.zeros(drive.time.size)
@@ -508,8 +515,8 @@ def test_a_run_in_two_pieces_is_the_run(name):
             time = drive.time[part]
             stretch, rate = np.zeros(time.size), np.zeros(time.size)
             status, _, _ = kernel.drive_by_voltage(
-                c, time, drive.voltage[part], drive.ends[part], drive.temperature[part],
-                y, stretch, rate,
+                c, time, drive.voltage[part], drive.ends[part],
+                np.ascontiguousarray(drive.air[:, part]), y, stretch, rate,
             )  # fmt: skip
             assert status == kernel.OK
             shown = (stretch - rest) * LENGTH

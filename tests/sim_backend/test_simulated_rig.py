@@ -23,7 +23,7 @@ from dearig.drivers.gate import admit
 from dearig.drivers.rig import RigState
 from dearig.drivers.settings import LaserSettings, RigSettings, ThermometerSettings
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, at_rest, initial_state
+from dearig.model.actuator import NO_AIR, Actuator, at_rest, initial_state
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load, Network
 from dearig.sim_backend.card import INPUT_OVERWRITTEN
 from dearig.sim_backend.clock import ManualClock, PacedClock
@@ -81,7 +81,7 @@ def expected_displacement(voltage, rate, shift):
     _, rest = at_rest(c)
     stretch, speed = np.empty(time.size), np.empty(time.size)
     status, _, _ = kernel.drive_by_voltage(
-        c, time, at_time, at_time, np.zeros(0), initial_state(c, rest), stretch, speed
+        c, time, at_time, at_time, NO_AIR, initial_state(c, rest), stretch, speed
     )
     assert status == kernel.OK
     at = np.searchsorted(time, np.maximum(wanted, 0.0) - 1e-9)

@@ -50,6 +50,11 @@ class Film:
         mu, limit = self.first
         self.rest = brentq(lambda e: mu * pull(limit, e) - self.load, 1.0, 2.0, xtol=1e-15)
 
+    def soften_at_rest(self, factor):
+        """Let the load stretch the film to where ``factor`` times its springs carry it."""
+        mu, limit = self.first
+        self.rest = brentq(lambda e: factor * mu * pull(limit, e) - self.load, 1.0, 2.0, xtol=1e-15)
+
     def strain(self, lam):
         """I1 above that at rest."""
         return lam**2 + lam**-2 - self.rest**2 - self.rest**-2
@@ -396,6 +401,52 @@ def extra(name, p, film, drive):
             ),
         )
 
+    def taking_up(**acts):
+        """An effect of the moisture, its last state, that follows the humidity of the room."""
+        states = acts.pop("states", 0) + 1
+        return Extra(
+            states=states,
+            slopes=lambda t, lam, u, z, v: (
+                *((0.0,) * (states - 1)),
+                (drive.moisture(t) - z[-1]) / p["sorption_time"],
+            ),
+            **acts,
+        )
+
+    def moist_stiffness():
+        film.soften_at_rest(1.0 + p["stiffening"] * drive.humidity)
+        return taking_up(
+            soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * (drive.humidity + z[-1])
+        )
+
+    def moist_electrodes():
+        def resistance(t):
+            return p["resistance"] * math.exp(p["growth"] * (drive.humidity + drive.moisture(t)))
+
+        return Extra(
+            states=1,
+            voltage=lambda t, lam, u, z, v: z[0],
+            slopes=lambda t, lam, u, z, v: (
+                (v - z[0]) / (resistance(t) * film.capacitance * lam**2) - 2.0 * u / lam * z[0],
+            ),
+        )
+
+    def moist_leakage():
+        ratio = p["loss"] / (1.0 - p["loss"])
+        return taking_up(
+            voltage=lambda t, lam, u, z, v: (
+                v / (1.0 + ratio * math.exp(p["growth"] * (drive.humidity + z[-1])))
+            )
+        )
+
+    def room_temperature():
+        film.soften_at_rest(1.0 + p["stiffening"] * drive.temperature)
+        return Extra(
+            soften=lambda t, lam, u, z, v: (
+                1.0 + p["stiffening"] * (drive.temperature + drive.warmth(t))
+            )
+        )
+
     def diffusing(terms=5):
         """Galerkin's equations for voltage along the sheet, in Legendre's polynomials of 0 to 1."""
         basis = [Legendre.basis(i, domain=[0.0, 1.0]) for i in range(terms)]
@@ -550,6 +601,13 @@ def extra(name, p, film, drive):
             )
         ),
         "viscoplastic flow": flowing,
+        "moist electrodes": moist_electrodes,
+        "moist leakage": moist_leakage,
+        "moist permittivity": lambda: taking_up(
+            electric=lambda t, lam, u, z, v: 1.0 + p["gain"] * (drive.humidity + z[-1])
+        ),
+        "moist stiffness": moist_stiffness,
+        "room temperature": room_temperature,
         "temperature": lambda: Extra(
             soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * drive.warmth(t)
         ),

@@ -250,3 +250,25 @@ class _Given:
     def view(self, name: str, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
         size = self._sizes.get(name.split()[0], 0.0)
         return np.linspace(first, last, 50), size * np.sin(np.arange(50.0))
+
+
+def test_the_room_is_shown_with_unit_and_age_where_it_is_measured(
+    qtbot: QtBot, run_page: RunPage, plan_of: Callable[[str], None]
+) -> None:
+    controls = run_page.controls
+    assert not controls.numbers["humidity"].isVisibleTo(controls)
+    measured = RigFile.model_validate(
+        {
+            "thermohygrometer": {"interval_s": 0.5},
+            "room": {"temperature_degC": 21.0, "relative_humidity_percent": 38.0},
+        }
+    )
+    run_page.session.set_rig_file(None, "", measured)
+    assert controls.numbers["humidity"].isVisibleTo(controls)
+    plan_of(SHORT)
+    qtbot.waitUntil(run_page.arm_button.isEnabled)
+    play(qtbot, run_page)
+    assert float(controls.numbers["temperature"].text) == pytest.approx(21.0, abs=0.2)
+    assert float(controls.numbers["humidity"].text) == pytest.approx(38.0, abs=0.6)
+    # SHORT lasts 4 s with lead-in and tail: the last reading is that of 3.5 or 4 s
+    assert controls.room_title.text() in ("Room, 0 s ago", "Room, 1 s ago")

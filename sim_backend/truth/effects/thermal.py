@@ -3,7 +3,8 @@
 ``self_heating``: losses in proportion to the square of the voltage warm the film, which warms frame
 and air around it: two bodies, two exponentials. Rubber elasticity stiffens by 1/T, a filled network
 softens, so either sign occurs. ``room``: a lamp or a heater in the room, a power law of the time
-since the start, A (1 - (1 + t/t_0)^-p). A thermometer near the film measures either.
+since the start, A (1 - (1 + t/t_0)^-p). ``weathered``: moduli follow the room of the simulated rig
+by an Arrhenius law, from recording to recording. A thermometer near the film measures each of them.
 """
 
 from __future__ import annotations
@@ -11,15 +12,18 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.material import Load
+from dearig.sim_backend.plant import Air
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import COURSE_HEATING, COURSE_STIFFNESS, FilmNumbers
 from dearig.sim_backend.truth.sampling import log_uniform
 
-__all__ = ["room", "self_heating"]
+__all__ = ["room", "self_heating", "weathered"]
 
 _PER_KELVIN = (-0.006, 0.0034)
 _HEAT = (0.02, 0.25)  # K/s under 5 kV
 _ROOM = (0.1, 3.5)  # K, final warming
+_ACTIVATION = (300.0, 900.0)  # K, energy over the gas constant
+_KELVIN, _REFERENCE = 273.15, 296.15  # K; films have the numbers of their data at 23 degC
 
 
 def _coefficient(generator: np.random.Generator) -> float:
@@ -75,3 +79,26 @@ def room(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: AR
         ),
         on_course=on_course,
     )
+
+
+def weathered(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Draw moduli exp(E/R (1/T - 1/T_0)) that follow the temperature of the room."""
+    kelvin = log_uniform(generator, *_ACTIVATION)
+    words = f"moduli fall by {kelvin / _REFERENCE**2:.2%}/K about 23 degC"
+
+    def stiffness(celsius: np.ndarray) -> np.ndarray:
+        return np.exp(kelvin * (1.0 / (celsius + _KELVIN) - 1.0 / _REFERENCE))
+
+    def in_room(air: Air) -> TruthEffect:
+        start = float(stiffness(air.temperature(np.zeros(1)))[0])
+
+        def on_course(time: np.ndarray, rows: np.ndarray) -> np.ndarray:
+            rows[COURSE_STIFFNESS] *= stiffness(air.temperature(time)) / start
+            return rows
+
+        return TruthEffect(
+            "thermal", "environment", words, in_room=in_room,
+            on_film=lambda numbers: numbers.stiffened(start), on_course=on_course,
+        )  # fmt: skip
+
+    return TruthEffect("thermal", "environment", words, in_room=in_room)

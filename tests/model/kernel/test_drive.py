@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 
 from dearig.model import coefficients as at
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, Drive, at_rest, ends_of, initial_state, reading_of
+from dearig.model.actuator import (
+    NO_AIR,
+    Actuator,
+    Drive,
+    at_rest,
+    ends_of,
+    initial_state,
+    reading_of,
+)
 from dearig.model.excitation import Sequence
 from dearig.model.fitting.parameters import THESIS_RANGES
 from dearig.model.material import (
@@ -198,9 +206,7 @@ def test_wild_coefficients_give_finite_numbers_and_a_status(
     if status == kernel.OK:
         stretch, rate = np.zeros(time.size), np.zeros(time.size)
         y = initial_state(c, rest)
-        kernel.drive_by_voltage(
-            c, time, voltage, ends_of(voltage, False), np.zeros(0), y, stretch, rate
-        )
+        kernel.drive_by_voltage(c, time, voltage, ends_of(voltage, False), NO_AIR, y, stretch, rate)
         np.testing.assert_array_equal((stretch - rest) * LENGTH, reading)
         assert np.isfinite(rate).all()
 
@@ -224,7 +230,7 @@ def test_a_record_cut_into_blocks_is_the_record(drive, hold):
             time[part],
             voltage[part],
             ends_of(voltage[part], hold),
-            np.zeros(0),
+            NO_AIR,
             y,
             stretch,
             rate,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
+from dearig.model.actuator import NO_AIR, Actuator, Drive, at_rest, initial_state, reading_of
 from dearig.model.effects import assembly
 from dearig.model.kernel.exponential_rk import exponential_steps, film_table
 from dearig.model.kernel.motion import network_stiffness, spring_table
@@ -83,7 +83,7 @@ def test_a_drag_of_any_strength_takes_no_more_steps_than_none(drag):
         _, rest = at_rest(c)
         stretch, rate = np.zeros(time.size), np.zeros(time.size)
         status, _, steps = kernel.drive_by_voltage(
-            c, time, drive.voltage, drive.ends, np.zeros(0), initial_state(c, rest), stretch, rate
+            c, time, drive.voltage, drive.ends, NO_AIR, initial_state(c, rest), stretch, rate
         )
         assert status == kernel.OK
         return steps

@@ -85,7 +85,7 @@ def test_an_address_says_hand_and_noise():
 
 @pytest.mark.parametrize("words", [("third",), ("second", "second"), ("pink", "coarse"), ("",)])
 def test_words_that_are_no_hand_and_no_noise(words):
-    with pytest.raises(ValueError, match="behind the seed stand one of first, second and one of"):
+    with pytest.raises(ValueError, match="behind the seed stand one of first, second, one of"):
         cases.case_of(7, words, THESIS_FILM, THESIS_LOAD)
     for how in ({"hand": "third"}, {"noise": "brown"}):
         with pytest.raises(ValueError, match="choose one of"):
