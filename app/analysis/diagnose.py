@@ -38,6 +38,7 @@ from dearig.analysis.records import (
     compare,
     noise_sentences,
     open_all,
+    room_sentences,
 )
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -309,6 +310,7 @@ def _prepared(
         for sentence in inspect(r, settings.drive, to_fit=r in recordings).findings
     ]
     said += noise_sentences((*recordings, *others))
+    said += room_sentences((*recordings, *others))
     said += air_sentences_of(recordings)
     said += extrapolated(recordings, others, settings.drive)
     films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})

@@ -37,6 +37,7 @@ from dearig.analysis.records import (
     compare,
     noise_sentences,
     open_all,
+    room_sentences,
 )
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -150,7 +151,12 @@ def identify_recordings(
         trials=tuple(trials),
         springs=springs,
         seconds=seconds,
-        quality=(*left_out, *also_left_out, *noise_sentences((*recordings, *others))),
+        quality=(
+            *left_out,
+            *also_left_out,
+            *noise_sentences((*recordings, *others)),
+            *room_sentences((*recordings, *others)),
+        ),
         few_data=few_data(recordings, drive),
         assumed=assumed_by(recordings, rig_file),
         published_fit=PUBLISHED_FIT if is_thesis_run else None,

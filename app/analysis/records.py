@@ -44,6 +44,7 @@ __all__ = [
     "open_all",
     "reading_noise_of",
     "recording_drive",
+    "room_sentences",
 ]
 
 #: A recording that was opened, or the path of one.
@@ -225,6 +226,17 @@ def _air(
     first = float(values[start].mean())
     changes = uniform_filter1d(values, samples, mode="nearest") - first
     return scale * changes, scale * first - reference
+
+
+def room_sentences(recordings: Sequence[Recording]) -> list[str]:
+    """Return a sentence with the means of temperature and humidity; none where not recorded."""
+    parts = []
+    for name, unit in (("temperature_degC", "°C"), ("relative_humidity_percent", "%")):
+        means = [m for m in (getattr(r, name) for r in recordings) if m is not None]
+        if means:
+            ends = dict.fromkeys(f"{m:.1f}" for m in (min(means), max(means)))
+            parts.append(f"{' to '.join(ends)} {unit}")
+    return [f"the room was at {', '.join(parts)} (means of the recordings)"] if parts else []
 
 
 def air_sentences_of(recordings: Sequence[Recording]) -> list[str]:

