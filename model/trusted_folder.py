@@ -106,7 +106,11 @@ def distrust_content(folder: Path) -> str:
     if os.name == "nt":
         return ""
     for place in _all_in(folder):
-        if reason := distrust_file(place):
+        try:
+            reason = distrust_file(place)
+        except FileNotFoundError:
+            continue  # another process that compiles too has renamed it meanwhile
+        if reason:
             return reason
     return ""
 

@@ -155,6 +155,24 @@ def test_files_in_it_count_too(home: Path) -> None:
 
 
 @posix
+def test_a_file_that_another_process_renames_meanwhile_is_passed_over(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = home / "kernels"
+    folder.mkdir(mode=0o700)
+    partial = folder / "kernel.nbc.tmp"
+    partial.touch(mode=0o600)
+    seen = trusted_folder.distrust_file
+
+    def renamed_first(path: Path) -> str:
+        if path == partial:
+            partial.rename(folder / "kernel.nbc")
+        return seen(path)
+
+    monkeypatch.setattr(trusted_folder, "distrust_file", renamed_first)
+    assert distrust_content(folder) == ""
+
+
 def test_where_the_usual_folder_is_not_trusted_a_private_one_is_found_again(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
