@@ -20,8 +20,8 @@ from dearig.acquisition.plan import Plan
 from dearig.acquisition.run import RunObserver
 from dearig.drivers.channels import CHANNEL_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
-from dearig.model.control import HoldAnswer
 from dearig.drivers.thermohygrometer import RoomReading
+from dearig.model.control import HoldAnswer
 from dearig.model.errors import ModelError
 from dearig.recording.rest_noise import lead_in
 from dearig.window.traces import ErrorsSoFar, Newest, Pyramid, RunningErrors
