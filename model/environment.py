@@ -54,23 +54,18 @@ def air_sentences(
     temperatures: Sequence[float | None], humidities: Sequence[float | None]
 ) -> Iterator[str]:
     """Yield why effects of a recorded humidity or temperature cannot be looked for."""
-    for what, values, least, shown, unit in (
-        (
-            "humidity", humidities, HUMIDITY_SPAN,
-            lambda value: 100.0 * (value + HUMIDITY), "%",
-        ),
-        (
-            "temperature", temperatures, TEMPERATURE_SPAN,
-            lambda value: value + CELSIUS, "°C",
-        ),
-    ):  # fmt: skip
+    for what, values, least, scale, reference, unit in (
+        ("humidity", humidities, HUMIDITY_SPAN, 100.0, HUMIDITY, "%"),
+        ("temperature", temperatures, TEMPERATURE_SPAN, 1.0, CELSIUS, "°C"),
+    ):
         known = [value for value in values if value is not None]
         if not known:
             continue
+        low, high = (scale * (value + reference) for value in (min(known), max(known)))
         if len(values) < 2:
             yield (
-                f"the room's {what} was recorded ({shown(known[0]):.1f} {unit}), but one recording "
-                f"cannot show what the film owes to it: give several at different values"
+                f"the room's {what} was recorded ({low:.1f} {unit}), but one recording cannot show "
+                f"what the film owes to it: give several at different values"
             )
         elif len(known) < len(values):
             yield (
@@ -79,6 +74,6 @@ def air_sentences(
             )
         elif max(known) - min(known) < least:
             yield (
-                f"the room's {what} hardly differs between the recordings ({shown(min(known)):.1f} "
-                f"to {shown(max(known)):.1f} {unit}): they cannot show what the film owes to it"
+                f"the room's {what} hardly differs between the recordings ({low:.1f} to {high:.1f} "
+                f"{unit}): they cannot show what the film owes to it"
             )

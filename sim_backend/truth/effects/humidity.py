@@ -69,7 +69,8 @@ class _Moisture:
             for before, after in pairwise(humid):
                 self._modes = _followed(self._modes, before, after, self._step, self._rates)
                 self._course.append(float(self._modes @ self._weights))
-        return np.interp(time, self._step * np.arange(len(self._course)), self._course)
+        grid = self._step * np.arange(len(self._course))
+        return np.asarray(np.interp(time, grid, self._course))
 
 
 def _followed(
