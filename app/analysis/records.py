@@ -18,6 +18,7 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator, Drive
 from dearig.model.denoise import quieted, reading_noise
+from dearig.model.effects import EFFECTS
 from dearig.model.environment import CELSIUS, HUMIDITY, air_sentences
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Lobes
@@ -300,6 +301,7 @@ def compare(
             )
         warnings += _other_rig(recording, model)
         drive_of = recording_drive(recording, drive)
+        warnings += _unknown_air(model, drive_of)
         lag = recording.displacement_delay - recording.displacement_skew
         response = model.simulate(drive_of, lag)
         if not response.ok:
@@ -356,6 +358,18 @@ def _converter_step(recording: Recording) -> float:
     off = np.abs(rises / step - np.round(rises / step))
     is_even = step > _ROUNDING * float(np.abs(levels).max()) and float(off.max()) < _OFF_STEP
     return step if is_even else 0.0
+
+
+def _unknown_air(model: Actuator, drive: Drive) -> list[str]:
+    """Return sentences on effects of the room whose air the recording does not have."""
+    sentences = []
+    for name, _ in model.effects:
+        needs = EFFECTS[name].needs
+        if needs == "humidity" and drive.humidity is None:
+            sentences.append(f"{name}: the humidity was not recorded, and is taken as 50 %")
+        elif needs == "temperatures" and drive.temperature is None:
+            sentences.append(f"{name}: the temperature was not recorded, and is taken as 23 °C")
+    return sentences
 
 
 def _other_rig(recording: Recording, model: Actuator) -> list[str]:
