@@ -53,10 +53,12 @@ class Feed:
         """Yield server-sent events: the state where it is new, and the age of its newest sample."""
         self._watchers += 1
         try:
-            if self._task is None or self._task.done():
-                self._fresh = asyncio.Event()
-                self._task = asyncio.create_task(self._follow())
             sent = 0
+            if self._task is None or self._task.done():
+                # what was seen last is old
+                self._fresh, self._state, self._changed = asyncio.Event(), "", None
+                sent = self._version
+                self._task = asyncio.create_task(self._follow())
             while not self._stopping():
                 fresh = self._fresh
                 if sent == self._version:

@@ -199,6 +199,26 @@ def test_what_is_watched_is_read_once_for_all_and_not_without_watchers(page, mad
     assert len(looks) == 1
 
 
+def test_a_watcher_who_comes_after_all_have_left_gets_no_old_state() -> None:
+    states = iter(range(1000))
+    feed = Feed(lambda: ({"n": next(states)}, 0.0), 0.0, clock=lambda: 5.0)
+
+    async def twice() -> list[str]:
+        found = []
+        for _ in range(2):
+            stream = feed.stream()
+            found.append(await anext(stream))
+            await stream.aclose()
+            while not feed._task.done():
+                await asyncio.sleep(0)
+        return found
+
+    first, second = asyncio.run(twice())
+    assert first == 'data: {"age_s": 5.0, "state": {"n":0}}\n\n'
+    assert '"n":0' not in second
+    assert '"state"' in second
+
+
 def test_bins_of_pieces_are_those_of_the_whole() -> None:
     rng = np.random.default_rng(3)
     time, values = np.arange(5000) / 1000.0, rng.normal(size=5000)

@@ -80,6 +80,9 @@ MEASUREMENTS = {
         "Campaigns that are killed, many runs in one process, and studies that lose their cluster",
         ("tests.benchmarks.bench_campaign", "tests.benchmarks.bench_study"),
     ),
+    "watchers": Measurement(
+        "A campaign whose watchers are killed", ("tests.benchmarks.bench_watchers",)
+    ),
     "soak": Measurement(
         "What a server and a program that runs for long keep", ("tests.benchmarks.bench_soak",)
     ),
