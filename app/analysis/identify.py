@@ -109,15 +109,18 @@ def identify_recordings(
             raise InputError(f"these recordings cannot be fitted: {error}") from error
 
     springs: tuple[SpringCandidate, ...] = ()
+    start: Network | None = None
     if spring == CHOOSE:
-        springs = _spring_candidates(records, recordings, others, base_of, counts, drive, progress)
-        best_one = next(s for s in springs if s.chosen)
-        spring, counts = best_one.spring, [best_one.branches]
+        springs, start = _spring_candidates(
+            records, recordings, others, base_of, counts, drive, progress
+        )
+        spring, counts = springs[0].spring, [springs[0].branches]
     alone = len(counts) == 1
 
     fits = _fits(
-        records, lambda n: base_of(n, spring), counts, method, seed, intervals and alone, progress
-    )
+        records, lambda n: base_of(n, spring), counts, method, seed, intervals and alone, start,
+        progress,
+    )  # fmt: skip
     # one number of independent samples for all, from the fit with the least structured residual
     correlation = max(1.0, min(fit.correlation for fit in fits))
     scores = [_bic(fit, records, correlation) for fit in fits]
@@ -171,9 +174,10 @@ def _spring_candidates(
     counts: Sequence[int],
     drive: str,
     progress: Progress,
-) -> tuple[SpringCandidate, ...]:
+) -> tuple[tuple[SpringCandidate, ...], Network]:
     """Return every strain energy with every number of branches, the most probable first.
 
+    And the network of the most probable one, as it was fitted.
     ``others`` are read here too, but for each candidate's error alone.
     """
     kinds = [(kind, count) for kind in SPRINGS for count in counts]
@@ -182,7 +186,8 @@ def _spring_candidates(
     except ModelError as error:
         raise InputError(f"these recordings cannot be fitted: {error}") from error
     found: list[SpringCandidate] = []
-    for trial in sorted(trials, key=lambda t: t.criterion):
+    ranked = sorted(trials, key=lambda t: t.criterion)
+    for trial in ranked:
         checked = [compare(r, trial.model, "validation", drive) for r in others]
         fitted = [compare(r, trial.model, "train", drive) for r in train]
         found.append(
@@ -199,7 +204,7 @@ def _spring_candidates(
                 chosen=not found,
             )
         )
-    return tuple(found)
+    return tuple(found), ranked[0].model.network
 
 
 def _fits(
@@ -209,14 +214,15 @@ def _fits(
     method: str,
     seed: int,
     intervals: bool,
+    smaller: Network | None,
     progress: Progress,
 ) -> list[Identification]:
     """Return the fit for each number of branches in ``counts``, which rise.
 
-    Each fit starts from the network of the one before. ``base_of`` gives the model to fit.
+    Each fit starts from the network of the one before too, the first from ``smaller``. ``base_of``
+    gives the model to fit.
     """
     fits: list[Identification] = []
-    smaller: Network | None = None
     for i, count in enumerate(counts):
         base = base_of(count)
 

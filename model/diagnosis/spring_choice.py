@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from dearig.model.film import Strip
 from dearig.model.fitting.identify import fit_globally
 from dearig.model.fitting.left_out import left_out
 from dearig.model.fitting.levenberg import descend
+from dearig.model.material import Network
 from dearig.model.records import Record
 
 __all__ = ["SpringTrial", "choose_springs"]
@@ -66,7 +67,8 @@ def choose_springs(
             progress("springs", (i + part) / len(candidates))
 
         try:
-            fits.append(_with_free_shape(Fitter(records, candidate, settings, workers), report))
+            fitter = Fitter(records, candidate, settings, workers)
+            fits.append(_with_free_shape(fitter, _beside(candidate, fits), report))
             kinds.append(candidate.network.equilibrium.kind)
         except ModelError as error:
             refused.append(error)
@@ -84,15 +86,41 @@ def choose_springs(
     )
 
 
-def _with_free_shape(fitter: Fitter, progress: Callable[[str, float], None]) -> Fit:
-    """Return the model without effects with the shape of its equilibrium spring fitted.
+def _beside(candidate: Actuator | Strip, fits: Sequence[Fit]) -> Network | None:
+    """Return a start of a ``candidate``: its equilibrium spring beside the best branches so far.
+
+    So that a law with more numbers, or more branches, does not fit worse by its starts alone.
+    """
+    network = candidate.network
+    known = [
+        f
+        for f in fits
+        if len(f.model.network.branches) <= len(network.branches)
+        and all(
+            a.spring.kind == b.spring.kind
+            for a, b in zip(f.model.network.branches, network.branches, strict=False)
+        )
+    ]
+    if not known:
+        return None
+    best = min(known, key=lambda f: f.cost).model.network
+    if best.equilibrium.kind == network.equilibrium.kind:
+        return best
+    first = replace(network.equilibrium, modulus=best.equilibrium.modulus)
+    return Network(first, best.branches)
+
+
+def _with_free_shape(
+    fitter: Fitter, nested: Network | None, progress: Callable[[str, float], None]
+) -> Fit:
+    """Return the fitted model, the shape of its equilibrium spring too; ``nested`` is one start.
 
     The evidence charges for it, so it is not held where it explains little. At an actuator's strain
     the branches do not show theirs.
     """
     if not fitter.of_actuator:
         problem = fitter.problem(fitter.base)
-        found, fixed = fit_globally(problem, None, progress)
+        found, fixed = fit_globally(problem, nested, progress)
         return fit_of(problem, fixed, found)
     held = fitter.baseline(progress)
     problem = held.problem

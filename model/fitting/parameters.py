@@ -308,7 +308,9 @@ class Layout:
         logarithms = [math.log(max(t, _FLOOR["T"])) for t in times]
         middle = math.exp(sum(logarithms) / len(logarithms)) if times else 1.0
         while len(springs) < len(self.network.springs):
-            springs.append(replace(springs[-1], modulus=1e-3 * springs[-1].modulus))
+            last, own = springs[-1], self.network.springs[len(springs)]
+            like = last if last.kind == own.kind else own
+            springs.append(replace(like, modulus=1e-3 * last.modulus))
             times.append(middle)
         branches = tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
         other = Network(springs[0], branches)
