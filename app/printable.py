@@ -10,7 +10,7 @@ from __future__ import annotations
 import unicodedata
 from typing import TextIO
 
-__all__ = ["MESSAGE_MAX", "PrintableStream", "no_formula", "printable"]
+__all__ = ["MESSAGE_MAX", "PrintableStream", "no_formula", "printable", "unmarked"]
 
 #: Unicode categories that are shown as escapes: controls, formats (bidirectional overrides, tags,
 #: zero-width space), lone surrogates, private use, unassigned, line and paragraph separators.
@@ -45,6 +45,11 @@ def no_formula(text: str) -> str:
     start programs. The apostrophe before it is the mark for text. Numbers are not passed here.
     """
     return f"'{text}" if text[:1] in _FORMULA and text else text
+
+
+def unmarked(cell: str) -> str:
+    """Return the text of a ``cell`` that ``no_formula`` made."""
+    return cell[1:] if cell[:1] == "'" and cell[1:2] in _FORMULA and cell[1:] else cell
 
 
 def _is_shown(character: str) -> bool:

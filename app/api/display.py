@@ -7,14 +7,18 @@ import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from dearig.report import html
 from dearig.report.figure_export import svg
 from dearig.report.figure_style import DRIVE, MARK, NOISE
+from dearig.report.head import head_of
 from dearig.report.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from dearig.recording.origin import Origin
 
 __all__ = ["card", "drawing", "facts", "table_html", "write_page"]
 
@@ -48,7 +52,7 @@ def facts(rows: Iterable[tuple[str, str]]) -> str:
     """Return a table of (name, value) rows."""
     lines = "".join(
         f'<tr style="background:none"><th style="{_CELL};text-align:left;font-weight:400;'
-        f'opacity:.75;white-space:nowrap">{escape(name)}</th>'
+        f'opacity:.75;overflow-wrap:anywhere">{escape(name)}</th>'
         f'<td style="{_CELL};text-align:left">{escape(value)}</td></tr>'
         for name, value in rows
     )
@@ -94,21 +98,19 @@ def drawing(figure: Figure, label: str) -> str:
     return f'<div style="max-width:36em;margin:.6em 0">{text}</div>'
 
 
-def write_page(path: str | Path, title: str, body: str) -> Path:
-    """Write ``body`` as an HTML page to ``path``; an existing file is replaced.
+def write_page(
+    path: str | Path, title: str, lead: str, body: str, origins: Iterable[Origin] = ()
+) -> Path:
+    """Write ``body``, HTML, as a page with the head of reports to ``path``, replacing it.
 
-    Raises ``InputError`` where the file may not be written.
+    ``lead`` is the kind of the page, ``origins`` those of its recordings. Raises ``InputError``
+    where the file may not be written.
     """
-    from dearig.recording.files import check_output, replaced_when_done
+    from markupsafe import Markup
 
-    path = check_output(path, overwrite=True)
-    page = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>:root{{color-scheme:light dark}}"
-        "body{font:1rem/1.5 system-ui,sans-serif;margin:2rem auto;max-width:60rem;padding:0 1rem}"
-        f"</style></head><body>{body}</body></html>\n"
-    )
-    with replaced_when_done(path, overwrite=True) as partial:
-        partial.write_text(page, encoding="utf-8", errors="replace", newline="\n")
-    return path
+    def contents() -> dict[str, Any]:
+        # the functions of this module have escaped all text in it
+        markup = Markup(body)  # noqa: S704
+        return {"title": title, "lead": lead, "head": head_of(origins), "body": markup}
+
+    return html.write_page(path, "card.html.j2", contents)

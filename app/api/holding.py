@@ -18,6 +18,7 @@ from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
 from dearig.recording.json_file import write_json
+from dearig.recording.origin import origin_of
 from dearig.recording.reader import open_recording
 from dearig.report.hold_page import hold_figure, hold_json, hold_summary
 
@@ -51,7 +52,9 @@ class HoldResult:
 
     def to_html(self, path: str | Path) -> Path:
         """Write a page with the summary and the figure to ``path``, replacing it."""
-        return write_page(path, self._title, self._repr_html_())
+        return write_page(
+            path, self._title, "Hold", self._repr_html_(), (origin_of(self.recording),)
+        )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write all numbers (``.json``) to ``path`` and return the path. Raises ``InputError``."""

@@ -13,6 +13,7 @@ from dearig.api.display import card, drawing, facts, write_page
 from dearig.api.models import Model
 from dearig.extras import import_extra
 from dearig.recording.layout import UNITS
+from dearig.recording.origin import Origin
 from dearig.report.numbers import seconds, significant
 from dearig.report.signal_figures import signal_figure
 from dearig.units import SHOWN
@@ -74,7 +75,15 @@ class Prediction:
 
     def to_html(self, path: str | Path) -> Path:
         """Write a page with the main facts and a figure to ``path``, replacing it."""
-        return write_page(path, self.prediction.title, self._repr_html_())
+        return write_page(
+            path, self.prediction.title, "Prediction", self._repr_html_(), (self._origin,)
+        )
+
+    @property
+    def _origin(self) -> Origin:
+        """The model, as the origin of these values."""
+        source = f"prediction of the model {self.prediction.model.name}"
+        return Origin(self.prediction.title, simulated=True, source=source)
 
     def __repr__(self) -> str:
         """Return title and size in a line."""

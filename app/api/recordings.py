@@ -33,6 +33,7 @@ from dearig.model.actuator import Actuator
 from dearig.progress import Progress, quiet
 from dearig.recording import recording as stored
 from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.origin import origin_of
 from dearig.recording.reader import open_recording
 from dearig.report.numbers import seconds, significant
 from dearig.report.signal_figures import signal_figure
@@ -81,7 +82,7 @@ class Recording(stored.Recording):
 
     def to_html(self, path: str | Path) -> Path:
         """Write a page with the main facts and a figure to ``path``, replacing it."""
-        return write_page(path, self.name, self._repr_html_())
+        return write_page(path, self.name, "Recording", self._repr_html_(), (origin_of(self),))
 
     def __repr__(self) -> str:
         """Return name, kind and size in a line."""

@@ -201,7 +201,7 @@ class Sequence:
 
     def to_html(self, path: str | Path) -> Path:
         """Write a page with the voltage over time to ``path``, replacing it."""
-        return write_page(path, self.name, self._repr_html_())
+        return write_page(path, self.name, "Sequence", self._repr_html_())
 
     def __repr__(self) -> str:
         """Return name and segments in a line."""

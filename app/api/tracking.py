@@ -108,7 +108,7 @@ class Inversion:
 
     def to_html(self, path: str | Path) -> Path:
         """Write a page with the main facts and a figure to ``path``, replacing it."""
-        return write_page(path, self.name, self._repr_html_())
+        return write_page(path, self.name, "Voltage for a target", self._repr_html_())
 
     def __repr__(self) -> str:
         """Return name, peak voltage and what is unreachable."""

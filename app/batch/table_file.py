@@ -14,6 +14,7 @@ from typing import Any
 from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.input_file import read_input
+from dearig.printable import no_formula, unmarked
 from dearig.recording.files import in_words, replaced_when_done, write_whole
 
 __all__ = ["columns_of", "read_table", "write_csv", "write_parquet"]
@@ -31,12 +32,19 @@ def columns_of(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write the rows to ``path``; a number is the shortest text that is read as the same number."""
+    """Write the rows to ``path``; a number is the shortest text that is read as the same number.
+
+    Text that a spreadsheet would take for a formula is marked as text, see ``no_formula``.
+    """
     text = io.StringIO()
     columns = columns_of(rows)
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(columns)
-    table.writerows([_cell(row.get(name)) for name in columns] for row in rows)
+    table.writerow(map(no_formula, columns))
+    cells = ([row.get(name) for name in columns] for row in rows)
+    table.writerows(
+        [no_formula(cell) if isinstance(cell, str) else _cell(cell) for cell in line]
+        for line in cells
+    )
     write_whole(path, text.getvalue().encode())
 
 
@@ -82,6 +90,7 @@ def read_table(path: Path) -> list[dict[str, Any]]:
         raise InputError(f"table {path}: not UTF-8 text; save the file in UTF-8") from error
     except csv.Error as error:
         raise InputError(f"table {path}: not CSV ({error})") from error
+    rows = [[unmarked(cell) for cell in row] for row in rows]
     head = rows[0] if rows else []
     if len(set(head)) != len(head):
         raise InputError(f"table {path}: two columns have the same name")

@@ -259,6 +259,17 @@ def without_secrets(arguments: Sequence[str]) -> list[str]:
 
 # ---------------------------------------------------------------- output
 
+
+def _printable_report(path: Path | None) -> Path | None:
+    """Refuse a report in PDF that no browser can print, before the work that it reports."""
+    if path is not None:
+        from dearig.report.pdf import check_browser, is_pdf
+
+        if is_pdf(path):
+            check_browser()
+    return path
+
+
 Json = Annotated[
     str | None,
     typer.Option(
@@ -270,7 +281,12 @@ Json = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Replace output files that exist.")]
 Report = Annotated[
     Path | None,
-    typer.Option(metavar="OUT.html", help="Write a report with figures to this file."),
+    typer.Option(
+        metavar="OUT.html|OUT.pdf",
+        help="Write a report with figures to this file; one in PDF is printed by Chromium, Chrome "
+        "or Edge.",
+        callback=_printable_report,
+    ),
 ]
 
 

@@ -18,6 +18,28 @@ ToWrite = Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to writ
 _PANEL = "Set-up and help"
 
 
+@commands.command(rich_help_panel=_PANEL)
+def pdf(
+    report: Annotated[
+        Path, typer.Argument(metavar="REPORT.html", help="A report of this program.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="OUT.pdf", help="File to write.", show_default="beside the report"
+        ),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Print a report to a PDF file, with Chromium, Chrome or Edge."""
+    from dearig.report.pdf import print_report
+
+    written = report.with_suffix(".pdf") if out is None else out
+    check_files(force, (report,), written, json=None)
+    print_report(report, written, force)
+    print_line(console_for(), str(written))
+
+
 @commands.command("rig-file", rich_help_panel=_PANEL)
 def rig_file_command(
     out: ToWrite,

@@ -21,6 +21,7 @@ from dearig.report.parameter_figures import (
     parameter_columns,
     parameters_figure,
 )
+from dearig.report.pdf import check_browser, is_pdf, write_pdf
 from dearig.report.residual_figures import bin_words, residual_panels
 from dearig.report.sentences import (
     describe_model,
@@ -156,11 +157,15 @@ def write_page(path: str | Path, template: str, contents: Callable[[], dict[str,
 
     ``contents`` returns the values of the template, among them those of every page: ``title``,
     ``lead`` (the kind of the report) and ``head`` (a ``dearig.report.head.Head``). A list of the
-    sections, which are its ``h2`` with an ``id``, is put after the head.
+    sections, which are its ``h2`` with an ``id``, is put after the head. A ``path`` that ends in
+    ``.pdf`` gets the page as it is printed.
     """
     from dearig.recording.files import check_output, replaced_when_done
 
     path = check_output(path, overwrite=True)  # before seconds are spent on figures
+    if is_pdf(path):
+        check_browser()
+        return write_pdf(_render(template, contents()), path)
     page = _render(template, contents())
     with replaced_when_done(path, overwrite=True) as partial:
         # bytes of a file name that are no text are shown as ?

@@ -13,6 +13,7 @@ from PySide6.QtCore import QBuffer, QMimeData, QRectF
 from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
 
+from dearig.printable import no_formula
 from dearig.window.plot_canvas import Canvas
 from dearig.window.plot_item import AxisText, Plot
 
@@ -110,7 +111,7 @@ def csv_text(plots: Sequence[Plot], visible: bool, delimiter: str = ",") -> str:
     dates = plots[0].dates
     text = io.StringIO()
     writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
-    writer.writerow(name for name, _ in table)
+    writer.writerow(no_formula(name) for name, _ in table)
     for row in range(max(values.size for _, values in table)):
         writer.writerow(_cell(values, row, dates and name == head_x) for name, values in table)
     return text.getvalue()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -489,3 +490,12 @@ class TestFigures:
         stands = (outcome.before, outcome.after)
         wanted = [c.errors.rms * 1e6 for stand in stands for c in stand.validation]
         assert widths == pytest.approx(wanted)
+
+
+def test_losing_candidates_are_folded_after_the_figures(page):
+    outcome, found = page
+    if not outcome.finding.rounds[0].candidates:
+        return
+    assert "details" in found.seen
+    assert re.search(r"Candidates that explain less \(\d+\)", found.words)
+    assert found.words.index("Measurement and model on validation") < found.words.index("Effects")

@@ -7,6 +7,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
+from dearig.batch.table_file import read_table, write_csv
 from dearig.report.figure_data import csv_url, figure_columns, to_csv
 from dearig.report.figures import comparison_figure, overview_figure
 from dearig.report.residual_figures import bin_words, residual_panels
@@ -73,3 +74,11 @@ def test_bins_of_readings_without_a_step_follow_the_spread():
     bars = residual_panels(actuator_comparison())[0].axes[0].containers[0].patches
     assert 12 <= len(bars) <= 60
     assert bars[0].get_width() < 4.0 * NOISE * 1e6
+
+
+def test_a_table_of_a_study_has_no_formula_and_is_read_as_it_was(tmp_path):
+    rows = [{"film": "=1+2", "@x": -1.5}, {"film": "F1", "@x": 3.0}]
+    write_csv(rows, tmp_path / "study.csv")
+    lines = (tmp_path / "study.csv").read_text("utf-8").splitlines()
+    assert lines[:2] == ["film,'@x", "'=1+2,-1.5"]
+    assert read_table(tmp_path / "study.csv") == rows
