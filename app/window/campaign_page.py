@@ -267,7 +267,13 @@ class CampaignPage(QWidget):
     def _opened(self, found: OpenedCampaign) -> None:
         self._folder, self._queue = found.folder, found.queue
         self._soon = found.queue
-        self.message.show_text("")
+        self.message.show_text(
+            "The program ended while the campaign went on. What it left open is settled when it is "
+            "started again."
+            if found.status == "killed"
+            else "",
+            "warn",
+        )
         self.controls.forget_proposal()
         self._sizes = {}
         self.plan.restore(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.batch.queue import DONE, LOST, SKIPPED, STOPPED, WAITING, Queue
+from dearig.config.campaignfile import Campaign
 from dearig.report.campaign_page import duration_text
 from dearig.window.campaign_plan import PlanSurvey
 from dearig.window.session import Session
@@ -32,8 +33,17 @@ def plan_words(found: PlanSurvey) -> str:
         f"{duration_text(forecast.seconds)} without computations"
         + (f", {runs_text(warm)} to warm up" if warm else "")
         + f" · {forecast.size / 1e6:.3g} MB of {forecast.free / 1e9:.3g} GB free"
+        + _told(campaign)
         + (f"\nAt most {margins}" if margins else "")
     )
+
+
+def _told(campaign: Campaign) -> str:
+    """Return whom the plan tells when a run or the campaign ends."""
+    notify = campaign.notify
+    ways = [f"the program {notify.command[0]}"] if notify.command else []
+    ways += ["a webhook"] if notify.webhook else []
+    return f" · tells {' and '.join(ways)}" if ways else ""
 
 
 def counted(queue: Queue) -> str:

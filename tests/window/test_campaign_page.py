@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
@@ -11,17 +12,23 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+from dearig.acquisition.interrupts import Interrupts
+from dearig.batch.after import Computed
 from dearig.batch.watching import seen
+from dearig.config.campaignfile import parse_campaign
 from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import CardSettings, LimitsSettings
+from dearig.errors import Interrupted
 from dearig.recording import open_recording
 from dearig.sim_backend.faults import FaultPlan
+from dearig.window.campaign_compute import ComputeApart
 from dearig.window.campaign_page import CampaignPage
 from dearig.window.document import TextFile
 from dearig.window.frame import MainWindow
 from dearig.window.hv import HighVoltage
 from dearig.window.running import Play, Runner
 from dearig.window.session import Session
+from dearig.window.worker_process import Response
 from tests.window.test_run_stories import click
 
 _PATIENCE = 120_000  # ms; of a machine that may be busy
@@ -247,6 +254,34 @@ def test_an_interlock_halts_until_a_person_says_what_was_seen(
     assert states(page) == ["stopped", "done", "done"]
 
 
+def test_what_is_computed_after_a_run_is_ended_by_stop_and_its_faults_are_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "lobe.toml").write_text(LOBE, "utf-8")
+    campaign = parse_campaign(PLAN + "[after]\nidentify = true\n", "the plan", tmp_path)
+    interrupts = Interrupts()
+    apart = ComputeApart(interrupts)
+    ours, theirs = Pipe()
+    monkeypatch.setattr(apart, "_started", lambda: ours)
+    stages: list[str] = []
+
+    def compute(*answers: Response) -> Computed:
+        for answer in answers:
+            theirs.send(answer)
+        return apart(
+            campaign, tmp_path / "a.h5", tmp_path, "", RIG, lambda stage, _: stages.append(stage)
+        )
+
+    done = Computed(numbers={"mu_0_kPa": 40.0})
+    assert compute(Response(1, "progress", ("fitting", 0.5)), Response(1, "done", done)) == done
+    assert stages == ["fitting"]
+    assert theirs.recv().given[1] == tmp_path / "a.h5"
+    assert compute(Response(2, "broken", ("an error", "trace"))).problems == ["an error"]
+    interrupts.ask()
+    with pytest.raises(Interrupted, match="at 0 V"):
+        compute()
+
+
 def test_the_window_closes_in_a_campaign_at_zero_and_the_journal_goes_on(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:
@@ -257,8 +292,15 @@ def test_the_window_closes_in_a_campaign_at_zero_and_the_journal_goes_on(
     window.show_page(page)
     surveyed(qtbot, page)
     page.controls.paced.setChecked(True)
-    begin(qtbot, page)
+    click(qtbot, page.controls.arm)
+    window.show_page(window.run_page)
+    qtbot.keyClick(window, Qt.Key.Key_F6)  # what is armed is no run
+    assert not runner.running
+    assert not window.run_page.arm_button.isEnabled()
+    window.show_page(page)
+    click(qtbot, page.controls.start)
     qtbot.waitUntil(lambda: far(page, 0.5), timeout=_PATIENCE)
+    window.show_page(window.run_page)
     assert "a campaign goes on" in window.run_page.blocked.text()
     assert not window.run_page.arm_button.isEnabled()
     folder = page.folder
