@@ -36,7 +36,7 @@ from dearig.window.campaign_plan import (
     open_campaign,
     with_requests,
 )
-from dearig.window.campaign_table import CampaignTable, rows_of_plan, rows_of_queue
+from dearig.window.campaign_table import CampaignTable, QueueRows, rows_of_plan
 from dearig.window.campaign_thread import CampaignRequest, CampaignThread
 from dearig.window.campaign_words import counted, obstacle, plan_words, runs_text
 from dearig.window.document import TextFile
@@ -82,6 +82,7 @@ class CampaignPage(QWidget):
         self._soon = self._queue  # with the requests that it has not taken yet
         self._survey: PlanSurvey | None = None  # of the present text
         self._sizes: dict[str, int] = {}
+        self._rows = QueueRows()
         self._thread: CampaignThread | None = None
         self._stage = ""
 
@@ -265,7 +266,7 @@ class CampaignPage(QWidget):
 
     @Slot(object)
     def _opened(self, found: OpenedCampaign) -> None:
-        self._folder, self._queue = found.folder, found.queue
+        self._folder, self._queue, self._rows = found.folder, found.queue, QueueRows()
         self._soon = found.queue
         self.message.show_text(
             "The program ended while the campaign went on. What it left open is settled when it is "
@@ -309,7 +310,7 @@ class CampaignPage(QWidget):
         except InputError as error:
             self._fail(str(error))
         queue = self._soon
-        self.table.show_rows(rows_of_queue(queue, self._sizes))
+        self.table.show_rows(self._rows.of(queue, self._sizes))
         self.headline.setText(counted(queue))
         left = f"{duration_text(queue.time_left)} are left" if queue.waiting else "No run waits"
         soon = "ends" if queue.ending else "pauses" if queue.paused else ""
@@ -429,6 +430,7 @@ class CampaignPage(QWidget):
         self._disarm()
         survey_folder, toml = self.plan.folder, self.plan.toml
         self._folder, self._queue, self._sizes = None, Queue(), {}
+        self._rows = QueueRows()
         self._soon = self._queue
         self.table.show_rows([])
         self.headline.setText("No runs yet")

@@ -26,7 +26,7 @@ from dearig.report.numbers import significant
 from dearig.window.session import Session
 from dearig.window.widgets import plain_tip
 
-__all__ = ["CampaignTable", "RunRow", "rows_of_plan", "rows_of_queue"]
+__all__ = ["CampaignTable", "QueueRows", "RunRow", "rows_of_plan"]
 
 _HEADS = ("Run", "State", "Time", "Disk", "Settings", "Result")
 _WIDTHS = (190, 105, 65, 75, 280)  # px; the last column takes what is left
@@ -87,21 +87,37 @@ def rows_of_plan(campaign: Campaign, forecast: Forecast | None) -> list[RunRow]:
     return rows
 
 
-def rows_of_queue(queue: Queue, sizes: Mapping[str, int]) -> list[RunRow]:
-    """Return the runs of a campaign in their order; ``sizes`` are bytes of their recordings."""
-    return [
-        RunRow(
+class QueueRows:
+    """Makes the rows of a campaign; those of runs that have not changed are used again.
+
+    A campaign may have thousands of runs, and the window must answer to STOP at any time.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[str, tuple[tuple[object, ...], RunRow]] = {}
+
+    def of(self, queue: Queue, sizes: Mapping[str, int]) -> list[RunRow]:
+        """Return the runs of ``queue`` in their order; ``sizes`` are bytes of their recordings."""
+        return [self._row(queue.runs[name], sizes.get(name, 0)) for name in queue.order]
+
+    def _row(self, run: RunState, size: int) -> RunRow:
+        key = (run.state, run.reason, run.recording, run.extremes, len(run.numbers), size)
+        known = self._known.get(run.name)
+        if known is not None and known[0] == key:
+            return known[1]
+        played = run.state in (DONE, LOST, STOPPED) and not run.extremes
+        row = RunRow(
             run.name,
             run.state,
             run.duration,
-            sizes.get(run.name, 0),
+            size,
             _settings(run.settings, run.warm_up),
             _result(run, _NUMBERS),
             _result(run, len(run.numbers)),
-            run.recording if run.state in (DONE, LOST, STOPPED) and not run.extremes else "",
+            run.recording if played else "",
         )
-        for run in queue.listed
-    ]
+        self._known[run.name] = key, row
+        return row
 
 
 def _settings(settings: Mapping[str, Any], warm_up: bool) -> str:
