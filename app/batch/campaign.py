@@ -29,6 +29,7 @@ from dearig.batch.queue import (
     LOST,
     REQUEST_KINDS,
     STOPPED,
+    CampaignOutcome,
     Queue,
     RunState,
     sha256_of,
@@ -79,23 +80,6 @@ class Arming:
     hours: float | None = None
     acknowledged: str = ""
     shown: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class CampaignOutcome:
-    """State of a campaign at the end of a session.
-
-    ``status`` is complete, ended (on request), armed_runs or armed_time (all armed runs
-    are played, or the armed time is over), band (a number has left its band), halted (a person
-    must look), refused (a run was not admitted) or interrupted; ``reason`` is a sentence, "" for
-    complete.
-    """
-
-    name: str
-    folder: Path
-    queue: Queue
-    status: str
-    reason: str
 
 
 def play_campaign(

@@ -34,7 +34,7 @@ from dearig.recording.files import one_line
 from dearig.recording.layout import iso_time
 
 if TYPE_CHECKING:
-    from dearig.batch.campaign import CampaignOutcome
+    from dearig.batch.queue import CampaignOutcome
 
 __all__ = ["Notifier", "await_notifications"]
 

@@ -13,7 +13,7 @@ from dearig.config.campaignfile import Campaign
 from dearig.config.toml_input import shown
 from dearig.errors import InputError
 
-__all__ = ["LOST", "PLAYED", "REQUEST_KINDS", "Queue", "RunState", "sha256_of"]
+__all__ = ["LOST", "PLAYED", "REQUEST_KINDS", "CampaignOutcome", "Queue", "RunState", "sha256_of"]
 
 #: States of a run whose voltage was played, or may have been.
 DONE, LOST, STOPPED = "done", "lost", "stopped"
@@ -241,6 +241,23 @@ class Queue:
     def model(self) -> str:
         """File of the last fitted model, relative to the folder, "" for none."""
         return next((run.model for run in reversed(self.listed) if run.model), "")
+
+
+@dataclass(frozen=True)
+class CampaignOutcome:
+    """State of a campaign at the end of a session.
+
+    ``status`` is complete, ended (on request), armed_runs or armed_time (all armed runs
+    are played, or the armed time is over), band (a number has left its band), halted (a person
+    must look), refused (a run was not admitted) or interrupted; ``reason`` is a sentence, "" for
+    complete.
+    """
+
+    name: str
+    folder: Path
+    queue: Queue
+    status: str
+    reason: str
 
 
 def _name(value: Any) -> str:

@@ -12,9 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.batch.campaign import CampaignOutcome
 from dearig.batch.journal import JOURNAL
-from dearig.batch.queue import Queue, RunState
+from dearig.batch.queue import CampaignOutcome, Queue, RunState
 from dearig.errors import InputError
 from dearig.recording.follow import Extremes, Follower, News
 from dearig.recording.index import ENDINGS

@@ -34,7 +34,7 @@ from dearig.cli.output import (
 from dearig.errors import InputError
 
 if TYPE_CHECKING:
-    from dearig.batch.campaign import CampaignOutcome
+    from dearig.batch.queue import CampaignOutcome
 
 __all__ = ["commands"]
 

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
         ValidateOutcome,
     )
     from dearig.analysis.tracking import TrackOutcome
-    from dearig.batch.campaign import CampaignOutcome
+    from dearig.batch.queue import CampaignOutcome
     from dearig.batch.studies import StudyTable
     from dearig.batch.trends import Trends
 

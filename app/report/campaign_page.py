@@ -8,10 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dearig.batch.campaign import CampaignOutcome
-from dearig.batch.forecast import Forecast
-from dearig.batch.queue import DONE, LOST, PLAYED, RUNNING, SKIPPED, STOPPED, WAITING, Queue
-from dearig.config.campaignfile import Campaign, settings_text
+from dearig.batch.queue import (
+    DONE,
+    LOST,
+    PLAYED,
+    RUNNING,
+    SKIPPED,
+    STOPPED,
+    WAITING,
+    CampaignOutcome,
+    Queue,
+)
+from dearig.config.campaignfile import settings_text
 from dearig.recording.origin import origins_of_files
 from dearig.report.head import head_of
 from dearig.report.html import picture, prefixes, write_page
@@ -21,7 +29,9 @@ from dearig.report.tables import Row, Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from dearig.batch.forecast import Forecast
     from dearig.batch.queue import RunState
+    from dearig.config.campaignfile import Campaign
 
 __all__ = [
     "campaign_json",

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dearig.batch.campaign import CampaignOutcome
-from dearig.batch.queue import DONE, LOST, RUNNING, SKIPPED, STOPPED, WAITING
+from dearig.batch.queue import DONE, LOST, RUNNING, SKIPPED, STOPPED, WAITING, CampaignOutcome
 from dearig.batch.watching import RECENT, Bins, Seen, SourceWatch
 from dearig.errors import InputError
 from dearig.printable import printable

@@ -12,7 +12,8 @@ from PySide6.QtCore import QObject, Signal
 
 from dearig.acquisition.plan import Plan
 from dearig.acquisition.run import RunObserver, RunOptions
-from dearig.batch.campaign import Arming, CampaignOutcome, play_campaign
+from dearig.batch.campaign import Arming, play_campaign
+from dearig.batch.queue import CampaignOutcome
 from dearig.config.campaignfile import Campaign
 from dearig.config.rigfile import RigFile
 from dearig.drivers.rig import Block, Event, RigIdentity

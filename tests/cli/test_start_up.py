@@ -53,6 +53,13 @@ def test_info_needs_no_solver(arguments: list[str]) -> None:
     assert "5168" in ended.stdout or "every check passed" in ended.stdout
 
 
+def test_watching_needs_no_solver() -> None:
+    """A watcher stands on the computer that runs the rig."""
+    ended = run(SOLVERS, "watch", str(SAMPLE), "--once")
+    assert ended.stderr == ""
+    assert "sample-plain.h5" in ended.stdout
+
+
 def test_export_to_csv_needs_no_solver(tmp_path: Path) -> None:
     out = tmp_path / "out.csv"
     ended = run(SOLVERS, "export", str(SAMPLE), "--to", "csv", "--out", str(out))

@@ -17,8 +17,7 @@ from nptdms import ChannelObject, TdmsWriter
 from openpyxl import Workbook
 from scipy.io import savemat
 
-from dearig.batch.campaign import CampaignOutcome
-from dearig.batch.queue import Queue
+from dearig.batch.queue import CampaignOutcome, Queue
 from dearig.config.campaignfile import EXAMPLE as CAMPAIGN
 from dearig.config.campaignfile import load_campaign
 from dearig.config.modelfile import load_model

@@ -13,8 +13,9 @@ import pytest
 
 from dearig.acquisition.run import RunOptions, RunResult
 from dearig.batch import campaign as module
-from dearig.batch.campaign import Arming, CampaignOutcome, play_campaign
+from dearig.batch.campaign import Arming, play_campaign
 from dearig.batch.journal import Journal
+from dearig.batch.queue import CampaignOutcome
 from dearig.config.campaignfile import Campaign, parse_campaign
 from dearig.config.rigfile import load_rig_file
 from dearig.drivers.rig import Block
