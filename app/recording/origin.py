@@ -78,8 +78,8 @@ def _film(recording: Recording) -> str:
 
 
 def _rig_file(noted: Mapping[str, object]) -> str:
-    if not noted.get("rig"):
-        return ""  # data from elsewhere have no rig file
+    if not noted.get("rig") or noted.get("source"):
+        return ""  # imported data have none
     if not noted.get("configuration"):
         return "none, the default rig"
     return str(noted.get("configuration_sha256", ""))

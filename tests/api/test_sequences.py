@@ -89,5 +89,5 @@ def test_a_sequence_shows_itself(tmp_path: Path) -> None:
     assert "<svg" in html
     assert "segments" in dearig.Sequence("empty")._repr_html_()
     page = lobes().to_html(tmp_path / "lobes.html").read_text(encoding="utf-8")
-    assert page.startswith("<!doctype html>")
+    assert page.startswith("<!DOCTYPE html>")
     assert lobes().plot().axes[0].lines[0].get_ydata().max() == pytest.approx(6.0, rel=1e-3)

@@ -51,6 +51,8 @@ def test_a_run_comes_back_to_the_last_bit(tmp_path: Path, run: Path, to: str) ->
         # a plain table has no place for more
         for what in ("hold", "film", "load", "kinematics", "sequence_toml"):
             assert getattr(second, what) == getattr(first, what)
+        for what in ("simulated", "rig", "seed", "operator"):
+            assert second.provenance.get(what) == first.provenance.get(what)
 
 
 @pytest.mark.parametrize("to", ["mat", "parquet"])

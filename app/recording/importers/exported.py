@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from dearig.model.errors import ModelError
@@ -13,18 +13,31 @@ from dearig.recording.layout import FORMAT, ZERO_ORDER
 
 __all__ = ["Exported", "exported"]
 
+#: Values of the provenance that an import keeps, and their types.
+_ORIGIN: dict[str, type] = {
+    "simulated": bool,
+    "rig": str,
+    "seed": int,
+    "operator": str,
+    "model": str,
+}
+
 T = TypeVar("T", Film, Load)
 
 
 @dataclass(frozen=True)
 class Exported:
-    """Fields as in a ``Recording``; missing or invalid ones have their defaults."""
+    """Fields as in a ``Recording``; missing or invalid ones have their defaults.
+
+    ``origin`` has those values of the provenance that say where the data are from.
+    """
 
     hold: bool = False
     kinematics: str | None = None
     film: Film | None = None
     load: Load | None = None
     sequence: str = ""
+    origin: Mapping[str, object] = field(default_factory=dict)
 
 
 def exported(about: Mapping[str, str]) -> Exported:
@@ -38,7 +51,24 @@ def exported(about: Mapping[str, str]) -> Exported:
         film=_made(Film, about.get("film", "")),
         load=_made(Load, about.get("load", "")),
         sequence=about.get("sequence", ""),
+        origin=_origin(about.get("provenance", "")),
     )
+
+
+def _origin(text: str) -> dict[str, object]:
+    """Return rig, seed and operator, and whether the rig was simulated, as the export says."""
+    try:
+        found = json.loads(text) if text else {}
+    except (ValueError, RecursionError):
+        return {}
+    if not isinstance(found, dict):
+        return {}
+    return {
+        name: found[name]
+        for name, kind in _ORIGIN.items()
+        # a truth is an int too
+        if isinstance(found.get(name), kind) and isinstance(found[name], bool) == (kind is bool)
+    }
 
 
 def _made(kind: type[T], text: str) -> T | None:

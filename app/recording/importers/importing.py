@@ -215,8 +215,9 @@ def prepare(
             stop.set()  # of a wrong cell, or an interrupt, one hears at once
             raise
     progress("checking", READ)
-    noted = {**_provenance(path, digest.result(), chosen, options), **metadata.provenance}
     was = exported(table.about)
+    noted = _provenance(path, digest.result(), chosen, options)
+    noted = {**was.origin, **noted, **metadata.provenance}
     film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
     rest = 0.0
     if values.kind == "actuator":
