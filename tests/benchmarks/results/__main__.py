@@ -83,6 +83,15 @@ MEASUREMENTS = {
     "watchers": Measurement(
         "A campaign whose watchers are killed", ("tests.benchmarks.bench_watchers",)
     ),
+    "trends": Measurement(
+        "Trends of many recordings, and the schedule of a study on many workers",
+        (
+            "tests.benchmarks.bench_trends --campaigns 400",
+            "tests.benchmarks.bench_trends --fitted 8",
+            "tests.benchmarks.bench_index",
+            "tests.benchmarks.bench_schedule",
+        ),
+    ),
     "soak": Measurement(
         "What a server and a program that runs for long keep", ("tests.benchmarks.bench_soak",)
     ),
