@@ -212,19 +212,18 @@ class CampaignPage(QWidget):
             self._ask_survey(soon=True)
         self._refresh()
 
-    def _ask_survey(self, soon: bool) -> None:
+    def _request(self) -> SurveyRequest:
+        """Return what is to be surveyed now."""
         session = self._session
-        if session.running:
-            return
-        self._survey = None
-        self.surveyor.ask(
-            SurveyRequest(
-                self.plan.toml, self.plan.folder, session.address, session.rig_file,
-                session.rig_text, session.film, self._folder or session.folder,
-                begun=self._folder is not None,
-            ),
-            soon,
+        return SurveyRequest(
+            self.plan.toml, self.plan.folder, session.address, session.rig_file, session.rig_text,
+            session.film, self._folder or session.folder, begun=self._folder is not None,
         )  # fmt: skip
+
+    def _ask_survey(self, soon: bool) -> None:
+        if not self._session.running:
+            self._survey = None
+            self.surveyor.ask(self._request(), soon)
 
     @Slot(object)
     def _unfolded(self, found: PlanSurvey) -> None:
@@ -238,6 +237,10 @@ class CampaignPage(QWidget):
 
     @Slot(object)
     def _surveyed(self, found: PlanSurvey) -> None:
+        if found.request != self._request():  # what is shown has changed meanwhile
+            if self.isVisible() and not self.surveyor.waits:
+                self._ask_survey(soon=False)
+            return
         self._survey = found
         if found.campaign is not None and found.forecast is not None:
             self._sizes = dict(

@@ -171,6 +171,14 @@ def test_an_armed_batch_is_that_which_was_declared_and_no_run(
     assert runner.armed_for(Play.CAMPAIGN)
     runner.stop()
     assert not runner.armed
+    # the survey of a plan that was changed while it was made
+    found = page._survey
+    assert found is not None
+    page.plan.edit.setPlainText(PLAN.replace("5.0", "4.5"))
+    page.surveyor.done.emit(found)
+    assert not page.controls.arm.isEnabled()
+    surveyed(qtbot, page)
+    assert "4.5" in page.table.rows[2].settings
     # in use by something else
     assert runner.arm(True, Play.RUN)
     assert not page.controls.arm.isEnabled()
