@@ -8,12 +8,11 @@ from itertools import combinations
 from math import comb, inf
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import OptimizeResult, differential_evolution, nnls
 
 from dearig.model import kernel
 from dearig.model.actuator import Actuator
-from dearig.model.coefficients import ELECTRIC, INERTIA, LENGTH, MODULUS, SECTION
+from dearig.model.coefficients import ELECTRIC, MODULUS
 from dearig.model.errors import ModelError
 from dearig.model.film import unit_stresses
 from dearig.model.fitting.parameters import THESIS_RANGES, Layout
@@ -30,8 +29,6 @@ __all__ = [
     "Algorithm1",
     "algorithm_1",
     "film_starts",
-    "moving_starts",
-    "voltage_misfit",
     "voltage_starts",
 ]
 
@@ -128,36 +125,6 @@ def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.
     return _ranked(layout, found, starts)
 
 
-def moving_starts(problem: Problem, starts: int = 6) -> tuple[np.ndarray, float]:
-    """Return starts (K, d) as ``voltage_starts`` with a moving mass, and that mass in kg.
-
-    The stress on the mass is proportional to the measured acceleration: one more column of the
-    least squares. It is found even where a fit without the mass ended far off.
-    """
-    layout = problem.layout
-    c = layout.coefficients(_start_values(layout))[0]
-    candidates, parts, target = _at_rest_balance(problem, lambda *_: None, moving=True)
-    weights, _ = nnls(parts.T, target)
-    less = target - weights[-1] * parts[-1]
-    found = _subsets(layout, _wide(layout), candidates, parts[:-1], less)
-    mass = max(weights[-1] - c[INERTIA], 0.0) * c[SECTION] / c[LENGTH]
-    return _ranked(layout, found, starts), float(mass)
-
-
-def voltage_misfit(problem: Problem, rest: float) -> float:
-    """Return the relative RMS of the Maxwell stress that branches leave at the measured stretch.
-
-    As in ``voltage_starts``, with any number of branches and about a given ``rest`` stretch: linear
-    least squares without simulation.
-    """
-    base = _actuator(problem)
-    c = problem.layout.coefficients(_start_values(problem.layout))[0]
-    parts, target = _balance(problem, base, c, _candidates(problem), rest)
-    triangle = np.asarray(np.linalg.qr(np.vstack([parts, target]).T, mode="r"))
-    _, left = nnls(triangle[:, :-1], triangle[:, -1])
-    return float(left / max(np.linalg.norm(target), 1e-300))
-
-
 def _actuator(problem: Problem) -> Actuator:
     base = problem.layout.base
     if not isinstance(base, Actuator):
@@ -192,7 +159,7 @@ def _candidates(problem: Problem) -> np.ndarray:
 
 
 def _at_rest_balance(
-    problem: Problem, progress: Progress, moving: bool = False
+    problem: Problem, progress: Progress
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return candidates (G, 2) and the balance as in ``_balance`` about its own rest state."""
     layout = problem.layout
@@ -202,7 +169,7 @@ def _at_rest_balance(
     measured = base.load.rest_length
     rest = 1.1 if measured is None else measured / base.film.length
     for turn in range(_REST_ITERATIONS):
-        parts, target = _balance(problem, base, c, candidates, rest, moving)
+        parts, target = _balance(problem, base, c, candidates, rest)
         progress("global search", (turn + 1) / (_REST_ITERATIONS + 1))
         if measured is not None:
             break
@@ -223,12 +190,8 @@ def _balance(
     c: np.ndarray,
     candidates: np.ndarray,
     rest: float,
-    moving: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Stress per unit modulus (1 + G, N) less that at rest, and the Maxwell stress (N,).
-
-    If ``moving``, both smoothed alike, and with the acceleration of the stretch as a last row.
-    """
+    """Stress per unit modulus (1 + G, N) less that at rest, and the Maxwell stress (N,)."""
     parts, targets = [], []
     for record in problem.records:
         if isinstance(record, ActuatorRecord):
@@ -242,14 +205,6 @@ def _balance(
             part -= part[:, :1]
             thrust = electric_along(base.film.held, stretch)
             target = c[ELECTRIC] * record.drive.voltage**2 * thrust
-            if moving:
-                step = float(np.median(np.diff(record.time)))
-                width = SMOOTHING / step
-                part = gaussian_filter1d(part, width, mode="nearest")
-                # from rest: the filter's weights do not quite add up to nothing
-                bend = gaussian_filter1d(stretch - rest, width, order=2, mode="nearest")
-                part = np.vstack([part, bend / step**2])
-                target = gaussian_filter1d(target, width, mode="nearest")
             parts.append(part)
             targets.append(target)
     return np.concatenate(parts, axis=1), np.concatenate(targets)
