@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from dearig.model.diagnosis.regression import Regression, is_unseen
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS
 from dearig.model.environment import recorded_of
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.records import ActuatorRecord
 
 __all__ = ["MUCH_LESS", "Found", "Race", "Search"]
 
@@ -325,13 +325,12 @@ class Search:
         if parent.drift:
             noise = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
             went = parent.mean_drift() * noise
-        times = fitter.times if fitter.of_actuator else _film_times(records)
         plain = fitter.problem(parent.model)
         residuals = -parent.plain_residuals()
         regression = Regression(
             records,
             parent.model,
-            times,
+            fitter.times,
             self.settings,
             parent.drift,
             went,
@@ -343,9 +342,3 @@ class Search:
         return regression, extent_of(
             records, lambda low, high: strongest_line(residual, step, low, high)
         )
-
-
-def _film_times(records: Sequence[Record]) -> tuple[float, float]:
-    """Return the relaxation times that ``records`` resolve: two samples to three durations."""
-    shortest = min(float(np.median(np.diff(r.time))) for r in records)
-    return 2.0 * shortest, 3.0 * max(float(r.time[-1] - r.time[0]) for r in records)

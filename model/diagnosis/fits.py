@@ -128,14 +128,9 @@ class Fit:
 
     def plain_residuals(self) -> np.ndarray:
         """Return measured less model (N,), in noises, with the drift in it."""
-        problem = self.problem
-        if problem.noise_drift is None:
+        if self.problem.noise_drift is None:
             return -self.residuals
-        bare = WhitenedProblem(
-            problem.records, problem.layout, workers=problem.workers,
-            fidelity=problem.fidelity, on_simulations=problem.on_simulations,
-        )  # fmt: skip
-        return -bare.residuals(self.x)
+        return -self.problem.white().residuals(self.x)
 
     def mean_drift(self) -> np.ndarray:
         """Return the most probable drift (N,) in noises, as the records count displacement."""
@@ -192,8 +187,6 @@ class Fitter:
         self.full = self.raw = tuple(with_model_error(r) for r in records)
         self.records = self._prepared(base)
         self.work, self.watched = Work(), watched
-        longest = max(float(r.time[-1] - r.time[0]) for r in records)
-        self.times = (settings.branch_time_min_s, settings.branch_time_max * longest)
         self._coarse: dict[tuple[str, ...], np.ndarray] = {}
         self._space: dict[bool, DriftSpace] = {}
         self._pink_density = 0.0
@@ -209,6 +202,16 @@ class Fitter:
     def of_actuator(self) -> bool:
         """Whether the records are driven by voltage."""
         return isinstance(self.base, Actuator)
+
+    @cached_property
+    def times(self) -> tuple[float, float]:
+        """Range of the branches' relaxation times, in s: of a film, from two samples on."""
+        records = self._measured if self.of_actuator else self.records
+        longest = max(float(r.time[-1] - r.time[0]) for r in records)
+        shortest = self.settings.branch_time_min_s
+        if not self.of_actuator:
+            shortest = 2.0 * min(float(np.median(np.diff(r.time))) for r in records)
+        return shortest, self.settings.branch_time_max * longest
 
     @property
     def has_tails(self) -> bool:
@@ -311,12 +314,7 @@ class Fitter:
         if not any(isinstance(r, ActuatorRecord) and r.coarse_drive for r in problem.records):
             return None
         if layout.names not in self._coarse:
-            plain = problem
-            if problem.noise_drift is not None:
-                plain = WhitenedProblem(
-                    problem.records, layout, workers=self.workers, fidelity=problem.fidelity,
-                    on_simulations=self._count,
-                )  # fmt: skip
+            plain = problem.white()
             x = layout.coordinates(layout.initial())
             self._coarse[layout.names] = plain.find_coarse_columns(x, ~self.fixed(layout))
         return self._coarse[layout.names]

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from itertools import pairwise
 
 import numpy as np
@@ -217,6 +218,12 @@ class WhitenedProblem(Problem):
         # the correction by full simulations is of whitened readings
         plain = predicted - self._correction
         return self.noise_drift.whitened(plain) + self._correction, status
+
+    def white(self) -> WhitenedProblem:
+        """Return the same problem under white noise alone."""
+        other = copy(self)
+        other.noise_drift, other.measured = None, other.readings
+        return other
 
     @property
     def edges(self) -> np.ndarray:

@@ -10,12 +10,14 @@ import numpy as np
 from scipy.signal import welch
 from scipy.stats import chi2, norm
 
-from dearig.model.diagnosis.results import NOISE_RMS, NOT_BY_CHANCE, Dependence, Signature
+from dearig.model.diagnosis.results import Dependence, Signature
+from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.fitting.intervals import correlation_time, unevenness
 from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["signatures"]
 
+_BY_CHANCE = 1e-3  # significance level of the test for a white spectrum
 _LAGS = 20  # of the Ljung-Box test
 _BINS = 24
 _SHARE = 0.03  # of the residual's variance beyond chance: below, there is no dependence
@@ -53,27 +55,7 @@ def signatures(records: Sequence[Record], trial: _Fitted) -> tuple[Signature, ..
 def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signature:
     time, noise = record.time, record.noise
     step = float(np.median(np.diff(time)))
-    model = record.measured - residual
-    # wide enough for the sign of the rate in a noisy reading
-    window = max(3, round(0.02 / step)) if isinstance(record, ActuatorRecord) else 3
-    smooth = np.convolve(np.pad(model, window // 2, mode="edge"), np.ones(window) / window, "valid")
-    rate = np.gradient(smooth[: time.size], time)
-    if isinstance(record, ActuatorRecord):
-        quantities = [
-            ("voltage squared", "kV^2", (record.drive.voltage * 1e-3) ** 2),
-            ("displacement", "mm", model * 1e3),
-            ("rate", "mm/s", rate * 1e3),
-            ("time", "s", time),
-        ]
-        up = rate
-    else:
-        up = np.gradient(record.stretch, time)
-        quantities = [
-            ("stretch", "", record.stretch),
-            ("rate of stretch", "1/s", up),
-            ("stress", "kPa", model * 1e-3),
-            ("time", "s", time),
-        ]
+    quantities, up = _quantities(record, record.measured - residual, step)
     # at rest there is neither loading nor unloading
     moving = np.abs(up) > 0.02 * float(np.max(np.abs(up)) or 1.0)
     used = residual[good]
@@ -92,9 +74,9 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     repeats = _first_less_repeats(record, residual, good)
     # the noise of a film record is a tolerance, whose spectrum need not be flat
     sensed = isinstance(record, ActuatorRecord)
-    uneven = unevenness(used, NOT_BY_CHANCE) if sensed else 0.0
+    uneven = unevenness(used, _BY_CHANCE) if sensed else 0.0
     is_independent = all(d.explained < _SHARE for d in dependences)
-    is_noise = rms < NOISE_RMS * noise and is_independent and uneven == 0.0
+    is_noise = rms < DiagnosisSettings.noise_margin * noise and is_independent and uneven == 0.0
     return Signature(
         record=record.name,
         time=time,
@@ -115,6 +97,34 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
             record, rms, is_noise, dependences, loops, repeats, frequency, density, step, uneven
         ),
     )
+
+
+def _quantities(
+    record: Record, model: np.ndarray, step: float
+) -> tuple[list[tuple[str, str, np.ndarray]], np.ndarray]:
+    """Return name, unit and values (N,) of what a residual may depend on, and the rate (N,).
+
+    ``model`` (N,) is the model's reading at samples ``step`` s apart.
+    """
+    time = record.time
+    if not isinstance(record, ActuatorRecord):
+        up = np.gradient(record.stretch, time)
+        return [
+            ("stretch", "", record.stretch),
+            ("rate of stretch", "1/s", up),
+            ("stress", "kPa", model * 1e-3),
+            ("time", "s", time),
+        ], up
+    # wide enough for the sign of the rate in a noisy reading
+    window = max(3, round(0.02 / step))
+    smooth = np.convolve(np.pad(model, window // 2, mode="edge"), np.ones(window) / window, "valid")
+    rate = np.gradient(smooth[: time.size], time)
+    return [
+        ("voltage squared", "kV^2", (record.drive.voltage * 1e-3) ** 2),
+        ("displacement", "mm", model * 1e3),
+        ("rate", "mm/s", rate * 1e3),
+        ("time", "s", time),
+    ], rate
 
 
 def _ljung_box(residual: np.ndarray) -> float:

@@ -15,8 +15,6 @@ from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 
 __all__ = [
-    "NOISE_RMS",
-    "NOT_BY_CHANCE",
     "Candidate",
     "Dependence",
     "Diagnosis",
@@ -27,11 +25,6 @@ __all__ = [
     "Step",
     "Unnamed",
 ]
-
-#: Residual over noise up to which it counts as noise: the noise is known to some per cent.
-NOISE_RMS = 1.08
-#: Significance level of the test for a white spectrum.
-NOT_BY_CHANCE = 1e-3
 
 
 @dataclass(frozen=True)
