@@ -58,6 +58,8 @@ def main() -> None:
     parser.add_argument("--tasks", type=int, default=1000, help="Tasks of the simulated study.")
     parser.add_argument("--branches", type=int, default=1)
     asked = parser.parse_args()
+    # worker processes import nothing from the working folder
+    os.environ["PYTHONPATH"] = str(Path(__file__).resolve().parents[2])
     options = StudyOptions("identify", branches=asked.branches, intervals=False)
     with tempfile.TemporaryDirectory() as made_folder:
         folder = Path(made_folder)

@@ -91,6 +91,8 @@ def main() -> None:
     parser.add_argument("--empty", type=int, default=300, help="Tasks without work.")
     count, empty = (vars(parser.parse_args())[name] for name in ("recordings", "empty"))
     options = StudyOptions("identify")
+    # worker processes import nothing from the working folder
+    os.environ["PYTHONPATH"] = str(Path(__file__).resolve().parents[2])
     with tempfile.TemporaryDirectory() as made_folder:
         folder = Path(made_folder)
         subjects = subjects_of([made(folder, count)], folder / "out")
