@@ -17,6 +17,7 @@ import heapq
 import os
 import tempfile
 import time
+from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
@@ -58,10 +59,9 @@ def main() -> None:
     parser.add_argument("--tasks", type=int, default=1000, help="Tasks of the simulated study.")
     parser.add_argument("--branches", type=int, default=1)
     asked = parser.parse_args()
-    # worker processes import nothing from the working folder
-    os.environ["PYTHONPATH"] = str(Path(__file__).resolve().parents[2])
     options = StudyOptions("identify", branches=asked.branches, intervals=False)
-    with tempfile.TemporaryDirectory() as made_folder:
+    # worker processes import nothing from the working folder, so that it is another one
+    with tempfile.TemporaryDirectory() as made_folder, chdir(made_folder):
         folder = Path(made_folder)
         subjects = subjects_of([made(folder, asked.fits)], folder / "out")
         fit_task(Task("warm", subjects[0].path, "", options))

@@ -15,7 +15,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from pathlib import Path
 
 from dearig.acquisition.run import RunOptions, record
@@ -91,9 +91,8 @@ def main() -> None:
     parser.add_argument("--empty", type=int, default=300, help="Tasks without work.")
     count, empty = (vars(parser.parse_args())[name] for name in ("recordings", "empty"))
     options = StudyOptions("identify")
-    # worker processes import nothing from the working folder
-    os.environ["PYTHONPATH"] = str(Path(__file__).resolve().parents[2])
-    with tempfile.TemporaryDirectory() as made_folder:
+    # worker processes import nothing from the working folder, so that it is another one
+    with tempfile.TemporaryDirectory() as made_folder, chdir(made_folder):
         folder = Path(made_folder)
         subjects = subjects_of([made(folder, count)], folder / "out")
         began = time.process_time()
