@@ -82,6 +82,13 @@ def taken(folder: Path, text: str | bytes, name: str = "in.csv", **options: obje
         pytest.param(
             table("Zeit [s];Spannung [V];Weg [µm]", (1, 1, 1e6)).encode("cp1252"), id="1252"
         ),
+        pytest.param(
+            table("时间(s),电压(V),位移(mm)").encode("gb18030"), id="Chinese names in GB 18030"
+        ),
+        pytest.param(
+            table("時間,電圧,変位").replace("変位", "変位\n[s],[V],[mm]", 1).encode("cp932"),
+            id="Japanese names in Shift-JIS",
+        ),
         pytest.param(table().encode("utf-16-le"), id="UTF-16 without its mark"),
         pytest.param(table().encode("utf-16-be"), id="UTF-16 BE without its mark"),
         pytest.param(
@@ -249,6 +256,10 @@ def test_columns_are_listed_with_what_they_seem_to_be(tmp_path: Path) -> None:
         ("Crosshead speed (mm/min)", (), ""),
         ("Temperatur (°C)", ("temperature",), "C"),
         ("Strom in nA", ("current",), "nA"),
+        ("试验力（kN）", ("force",), "kN"),  # noqa: RUF001
+        ("ひずみ [%]", ("strain",), "pct"),
+        ("应力 / MPa", ("nominal_stress",), "MPa"),
+        ("压力 (MPa)", (), "MPa"),
         ("Channel A", (), "A"),
         ("CH1", (), ""),
     ],

@@ -1,4 +1,4 @@
-"""Quantities of columns, recognised by their names in English, German and French.
+"""Quantities of columns, by names in English, German, French, Chinese and Japanese.
 
 ``voltage_kV`` is the name that this program gives a voltage in kV: the quantity and the unit.
 Files of other programs call it ``Voltage [kV]``, ``Spannung / kV`` or ``Tension (kV)``.
@@ -14,12 +14,13 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from dearig.errors import InputError
-from dearig.recording.importers.units import UNITS, Scale, unit_of
+from dearig.recording.importers.units import UNITS, WIDE_BRACKETS, Scale, unit_of
 
 __all__ = [
     "DIMENSIONS",
     "Label",
     "Target",
+    "has_east_asian_name",
     "label_of",
     "names_of",
     "suggestion",
@@ -42,6 +43,13 @@ DIMENSIONS = MappingProxyType(
         "force": "force",
     }
 )
+
+
+def _plain(text: str) -> str:
+    """Return ``text`` in small letters without accents."""
+    apart = unicodedata.normalize("NFKD", text.casefold())
+    return "".join(c for c in apart if not unicodedata.combining(c))
+
 
 #: Words of a name, without accents and in small letters, by quantity. A name that is written
 #: together, such as Standardkraft, counts by its end.
@@ -68,6 +76,27 @@ for _quantity, _names in _WORDS.items():
         _QUANTITIES_OF.setdefault(_word, []).append(_quantity)
 #: Ends of German names that are written together.
 _ENDS = ("kraft", "spannung", "weg", "zeit", "dehnung", "strom", "verschiebung", "temperatur")
+
+#: Ends of Chinese and Japanese names, by quantity; what ends another one is after it.
+_EAST_ASIAN = MappingProxyType(
+    {
+        "time": "时间 時間 时刻 時刻",
+        "voltage_monitor": "电压监测 電圧モニタ",
+        "voltage": "电压 電圧 電壓",
+        "current": "电流 電流",
+        "temperature": "温度 溫度",
+        "stretch": "伸长比 拉伸比 伸張比",
+        "strain": "应变 應變 ひずみ 歪み 伸长率",
+        "nominal_stress": "应力 応力 應力",
+        "displacement": "位移 変位 伸长 伸長 伸び 行程 ストローク",
+        "force": "载荷 负荷 荷重 荷载 力值 试验力 試験力 拉力 力",
+    }
+)
+_EAST_ASIAN_ENDS = tuple(
+    (_plain(end), quantity) for quantity, ends in _EAST_ASIAN.items() for end in ends.split()
+)
+#: Ends of a pressure, which is no force.
+_EAST_ASIAN_OTHERS = ("压力", "圧力", "壓力")
 
 #: Words of a quantity of another kind: true stress is no nominal stress, a speed is no travel.
 _OTHERS = frozenset(
@@ -194,7 +223,7 @@ def _unknown_unit(name: str) -> str:
 #: Characters of a unit, at most: (measured) is none.
 UNIT_MAX = 7
 _RAW = ("displacement", "current", "voltage_monitor")
-_BRACKETS = str.maketrans("()", "[]")
+_BRACKETS = str.maketrans(f"(){WIDE_BRACKETS}", "[][]")
 _IN_BRACKETS = re.compile(r"\[([^\[\]]+)\]")
 _UNIT_IN_NAME = (
     re.compile(r"(?P<name>.*\S)\s*,\s*(?P<unit>\S+)"),
@@ -206,9 +235,7 @@ _UNIT_IN_NAME = (
 
 def _quantities(name: str) -> list[str]:
     """Return the quantities that the words of ``name`` stand for."""
-    plain = unicodedata.normalize("NFKD", name.casefold())
-    plain = "".join(c for c in plain if not unicodedata.combining(c))
-    words = re.findall(r"[^\W\d_]+", plain)
+    words = re.findall(r"[^\W\d_]+", _plain(name))
     if _OTHERS.intersection(words):
         return []
     found: list[str] = []
@@ -216,12 +243,25 @@ def _quantities(name: str) -> list[str]:
         known = _QUANTITIES_OF.get(word)
         if known is None:
             end = next((e for e in _ENDS if word.endswith(e)), "")
-            known = _QUANTITIES_OF.get(end, [])
+            known = _QUANTITIES_OF.get(end) or _east_asian(word)
         if len(word) > 1 or len(words) == 1:  # a letter among words is an index
             found += [q for q in known if q not in found]
     if "voltage_monitor" in found:  # of the voltage, unless its name says of what
         found = [q for q in found if q in ("current", "displacement")] or ["voltage_monitor"]
     return found
+
+
+def _east_asian(word: str) -> list[str]:
+    """Return the quantity of a Chinese or Japanese name without accents, as a list."""
+    if word.endswith(_EAST_ASIAN_OTHERS):
+        return []
+    return [quantity for end, quantity in _EAST_ASIAN_ENDS if word.endswith(end)][:1]
+
+
+def has_east_asian_name(text: str) -> bool:
+    """Return whether ``text`` has a Chinese or Japanese name of a quantity, of two characters."""
+    ends = (end for ends in _EAST_ASIAN.values() for end in ends.split())
+    return any(len(end) > 1 and end in text for end in ends)
 
 
 def suggestion(wanted: Iterable[str], there: Iterable[str]) -> str:

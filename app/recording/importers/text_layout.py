@@ -18,6 +18,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from dearig.errors import InputError
+from dearig.recording.importers.labels import has_east_asian_name
 from dearig.recording.importers.text_numbers import Signs, is_number, signs_of
 from dearig.recording.importers.units import unit_of
 
@@ -45,6 +46,7 @@ _MARKS = {
     codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
 }
+_EAST_ASIAN = ("gb18030", "cp932")  # taken where they give a name that is known
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: any white space
 _RULE = re.compile(r"[\s|+:=_*-]+")  # a line that is drawn below the names
 _SAMPLE = 400  # lines of data that are looked at
@@ -114,6 +116,10 @@ def encoding_of(raw: bytes, path: Path) -> str:
         codecs.getincrementaldecoder("utf-8")().decode(raw)
     except UnicodeDecodeError:
         # numbers are ASCII in any case; only a name may be decoded wrongly
+        for encoding in _EAST_ASIAN:
+            text = codecs.getincrementaldecoder(encoding)("replace").decode(raw)
+            if "\N{REPLACEMENT CHARACTER}" not in text and has_east_asian_name(text):
+                return encoding
         return "cp1252" if not set(raw) & {0x81, 0x8D, 0x8F, 0x90, 0x9D} else "latin-1"
     return "utf-8"
 

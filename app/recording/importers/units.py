@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-__all__ = ["ALIASES", "UNITS", "Scale", "unit_of"]
+__all__ = ["ALIASES", "UNITS", "WIDE_BRACKETS", "Scale", "unit_of"]
 
 
 @dataclass(frozen=True)
@@ -135,10 +135,13 @@ _WRITTEN_OUT = MappingProxyType(
     {a.lower(): s for a, s in ALIASES.items() if a.isalpha() and a[1:].islower() and len(a) > 2}
 )
 
+#: Brackets of Chinese and Japanese texts.
+WIDE_BRACKETS = "\N{FULLWIDTH LEFT PARENTHESIS}\N{FULLWIDTH RIGHT PARENTHESIS}"
+
 
 def unit_of(text: str) -> tuple[str, tuple[str, ...]] | None:
     """Return the symbol of a unit that is written as ``text``, and its dimensions; else None."""
-    text = text.strip().strip("()[]").strip()
+    text = text.strip().strip(f"()[]{WIDE_BRACKETS}").strip()
     symbol = ALIASES.get(text) or _WRITTEN_OUT.get(text.lower(), text)
     dimensions = tuple(d for d, units in UNITS.items() if symbol in units)
     return (symbol, dimensions) if dimensions else None
