@@ -54,8 +54,9 @@ def own_of(
     """Return the events and the drift of ``record`` beside ``model``; None without any.
 
     They are accepted only if the remaining error is noise, or a fiftieth of what they explain: an
-    event imitates part of any law that the model lacks. An effect acts at one moment of a
-    recording, so of two events of one kind the larger is found.
+    event imitates part of any law that the model lacks. What explains as much from the start on is
+    a difference of the whole recording and no event. An effect acts at one moment of a recording,
+    so of two events of one kind the larger is found.
     """
     fitter = Fitter([record], replace(model, effects=()), settings or DiagnosisSettings(), 1)
     fitter.read_colour()
@@ -112,8 +113,24 @@ def _with_events(fitter: Fitter, judge: Judge, best: Fit) -> Fit:
         top = min(fits, key=judge.criterion, default=best)
         if judge.gain(best, top) < fitter.settings.odds:
             break
+        whole = _from_the_start(fitter, top, held)
+        judge.see([whole])
+        if judge.gain(whole, top) < fitter.settings.odds:
+            break  # all of the recording differs from the model: nothing happened in it
         best = top
     return best
+
+
+def _from_the_start(fitter: Fitter, fit: Fit, held: int) -> Fit:
+    """Return ``fit`` with its last event as a difference of the whole recording, of any size."""
+    layout = fit.problem.layout
+    values = layout.values(fit.x)
+    values[-1] = fitter.records[0].time[0]
+    start = np.clip(layout.coordinates(values), layout.lower, layout.upper)
+    fixed = np.arange(layout.size) < held
+    fixed[-1] = True  # the moment
+    found = descend_broyden(fit.problem, start, fixed, None, _ITERATIONS, 1.0, True)
+    return fit_of(fit.problem, fixed, found)
 
 
 def _with_event(fitter: Fitter, best: Fit, name: str, held: int) -> Fit:

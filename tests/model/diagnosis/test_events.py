@@ -58,3 +58,13 @@ def test_a_law_that_the_model_lacks_is_not_taken_off_as_events() -> None:
     left = record.displacement - PLAIN.simulate(record.drive).displacement
     assert np.sqrt(np.mean(left**2)) > 10.0 * NOISE
     assert own_of(record, PLAIN) is None
+
+
+@pytest.mark.parametrize("part", [0.9985, 1.003])
+def test_a_film_that_differs_from_the_start_on_has_no_event(part: float) -> None:
+    film = replace(PLAIN.film, permittivity=part * PLAIN.film.permittivity)
+    record = record_of(replace(PLAIN, film=film))
+    left = record.displacement - PLAIN.simulate(record.drive).displacement
+    assert np.sqrt(np.mean(left**2)) > 1.5 * NOISE
+    own = own_of(record, PLAIN)
+    assert own is None or own.events == ()
