@@ -11,8 +11,9 @@ five iterations of learning, and the peers of ``track_peers``: a PID loop in sof
 with the linear map added, and learning without a model. The peers have the film of the rig, its
 noise, its limits and the same path; they get the nearest feasible one for nothing.
 
-Rigs are the first ``--rigs`` from ``--first`` on that hide something. ``--out FILE`` keeps a line
-of JSON for each rig: those that are in it are not played again.
+Rigs are the first ``--rigs`` from ``--first`` on that hide something; one on which an interlock
+ends a run is left out, and its seed printed. ``--out FILE`` keeps a line of JSON for each rig:
+those that are in it are not played again.
 
 Errors are target minus measured, RMS, where the model with the effect can follow. "Beyond the
 noise" is the root of the difference of the squares of error and noise, that of all runs together.
@@ -24,6 +25,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
@@ -44,6 +46,7 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
 from dearig.config.targetfile import LoadedTarget, target_of
 from dearig.drivers.settings import CardSettings
+from dearig.errors import SafetyStop
 from dearig.model import kernel
 from dearig.model.actuator import Actuator
 from dearig.model.control.bands import low_pass
@@ -125,12 +128,18 @@ def main() -> None:
         f"model-free {ITERATIONS}",
     )  # fmt: skip
     print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
-    rows = []
+    rows: list[Row] = []
+    stopped: list[int] = []
     for seed in seeds:
         row = kept.get(seed)
         if row is None:
-            with tempfile.TemporaryDirectory() as folder:
-                row = _row(seed, FITS[given.fit], FilePath(folder))
+            try:
+                with tempfile.TemporaryDirectory() as folder:
+                    row = _row(seed, FITS[given.fit], FilePath(folder))
+            except SafetyStop as stop:
+                print(f"{seed} ({drawn(seed).description}): {stop}", file=sys.stderr, flush=True)
+                stopped.append(seed)
+                continue
             if given.out:
                 with given.out.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(asdict(row)) + "\n")
@@ -141,6 +150,7 @@ def main() -> None:
         )  # fmt: skip
         cells = [f"{' + '.join(row.hidden)} ({seed})", row.found, *(f"{f:.2f}" for f in figures)]
         print("| " + " | ".join(cells) + " |", flush=True)
+    print(f"\nRigs on which an interlock ended a run, left out: {stopped or 'none'}.")
     _summary(rows)
 
 
