@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -21,8 +22,9 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidge
 
 from dearig.batch.forecast import Forecast
 from dearig.batch.queue import DONE, LOST, RUNNING, SKIPPED, STOPPED, WAITING, Queue, RunState
-from dearig.config.campaignfile import Campaign, settings_text
+from dearig.config.campaignfile import Campaign
 from dearig.report.numbers import significant
+from dearig.window.fields import in_words, shown_value
 from dearig.window.session import Session
 from dearig.window.widgets import plain_tip
 
@@ -121,7 +123,18 @@ class QueueRows:
 
 
 def _settings(settings: Mapping[str, Any], warm_up: bool) -> str:
-    return "warm-up" if warm_up else settings_text(settings)
+    """Return the settings of a run in words: segment 1: amplitude (kV) 6."""
+    if warm_up:
+        return "warm-up"
+    named = ((_SEGMENT.sub(_segment, path), value) for path, value in settings.items())
+    return "; ".join(f"{in_words(name)} {shown_value(value)}" for name, value in named)
+
+
+_SEGMENT = re.compile(r"^segment\.(\d+)\.")
+
+
+def _segment(match: re.Match[str]) -> str:
+    return f"segment {int(match[1]) + 1}: "
 
 
 def _result(run: RunState, most: int) -> str:

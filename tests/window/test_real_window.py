@@ -156,7 +156,7 @@ def test_a_killed_server_leaves_an_unknown_output_and_a_latched_alarm(
     assert "switch the amplifier off" in saw["detail"]
     assert "COULD NOT BE MADE SAFE" in saw["alarm"]
     assert saw["time"].startswith("last sample,")
-    assert saw["kept"] == [True] * 7  # F5 on every page, and a click on Arm
+    assert saw["kept"] == [True] * 8  # F5 on every page, and a click on Arm
     assert saw["acknowledged"] == "UNKNOWN"
     recording = open_recording(next(tmp_path.glob("*.h5")))
     messages = [event.message for event in recording.events]
