@@ -10,7 +10,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QEvent, QSettings, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QWidget
 
 from dearig.window.frame import MainWindow
@@ -44,7 +44,14 @@ def main() -> None:
     saw: dict[str, object] = {}
 
     def click(widget: QWidget) -> None:
-        hand.click(widget.mapToGlobal(widget.rect().center()))
+        places = [QPoint()]
+
+        def stands() -> bool:  # a page that was just shown may still be laid out
+            places.append(widget.mapToGlobal(widget.rect().center()))
+            return widget.isVisible() and places[-1] == places[-2]
+
+        until(stands, "a widget that stands still")
+        hand.click(places[-1])
 
     def type_into(field: QWidget, text: str) -> None:
         click(field)
