@@ -23,6 +23,9 @@ __all__ = [
 ]
 
 CHI2_95 = 3.841458820694124  #: 95 % of chi-square with one degree of freedom
+#: Eigenvalue of a normal matrix in units of its diagonal that tells of a direction: derivatives by
+#: differences are known to some 1e-5, and a smaller eigenvalue is their error.
+_TOLD = 1e-10
 _POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: tolerance of its crossing
 _NEAR_A_LIMIT = 0.3  # the same for an undetermined limit, which is bounded to decades only
@@ -99,13 +102,26 @@ def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:
 
     Directions without influence on the data get a huge variance, not an exception.
     """
+    return inflation * _inverse(normal, lambda w: 1.0 / np.maximum(w, 1e-14))
+
+
+def _inverse(normal: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return the inverse of ``normal`` (f, f) by its eigenvalues in units of its diagonal."""
     if normal.size == 0:
         return normal
     seen = np.sqrt(np.diag(normal))
     scale = np.maximum(seen, 1e-12 * (float(seen.max()) or 1.0))
     w, q = np.linalg.eigh(normal / np.outer(scale, scale))
-    inverse = (q / np.maximum(w, 1e-14)) @ q.T
-    return inflation * inverse / np.outer(scale, scale)
+    return np.asarray((q * of(w)) @ q.T / np.outer(scale, scale))
+
+
+def _least(normal: np.ndarray) -> np.ndarray:
+    """Return the pseudo-inverse of ``normal`` (f, f): what the data do not tell stays."""
+
+    def of(w: np.ndarray) -> np.ndarray:
+        return np.where(w > _TOLD, 1.0 / np.maximum(w, _TOLD), 0.0)
+
+    return _inverse(normal, of)
 
 
 @dataclass(frozen=True)
@@ -133,7 +149,7 @@ def _path(
 ) -> _Path:
     """Return the path of coordinate ``index``; ``j`` (N, f) is the Jacobian of ``others``."""
     layout = problem.layout
-    inverse = covariance(j.T @ j, 1.0)
+    inverse = _least(j.T @ j)
     probe = layout.differences(best)[index]
     first, second = np.zeros(layout.size), np.zeros(layout.size)
     first[index] = 1.0
@@ -195,10 +211,15 @@ def profile(
             points = np.clip(
                 inside + sign * step * shorter, layout.lower[index], layout.upper[index]
             )
-            guesses = path.start + np.clip(path.ahead(points) - path.start, -reach, reach)
-            guesses = np.where(held, best, np.clip(guesses, layout.lower, layout.upper))
-            guesses[:, index] = points
-            excess = problem.costs(guesses) * problem.samples - chi2
+            moved = path.start + np.clip(path.ahead(points) - path.start, -reach, reach)
+            moved = np.where(held, best, np.clip(moved, layout.lower, layout.upper))
+            # where the data hardly tell of the others, the path leads astray: they may stay as well
+            both = np.stack([moved, np.tile(path.start, (points.size, 1))])
+            both[..., index] = points
+            costs = problem.costs(both.reshape(-1, layout.size)).reshape(2, -1)
+            nearer = np.argmin(np.where(np.isfinite(costs), costs, np.inf), axis=0)
+            guesses = both[nearer, np.arange(points.size)]
+            excess = costs[nearer, np.arange(points.size)] * problem.samples - chi2
             good = np.flatnonzero(excess < _GUESS_MAX * threshold)
             chosen = int(good[0]) if good.size else points.size - 1
             point = float(points[chosen])

@@ -55,3 +55,21 @@ def test_means_of_readings_have_the_optimum_of_all_readings(lead_in: int) -> Non
     scale = np.linalg.norm(means.jacobian(best.x, free), axis=0)
     # in standard deviations
     assert np.abs(gradient / scale).max() < 0.1
+
+
+def test_no_interval_is_narrower_than_with_all_others_known() -> None:
+    """Two branches that the data do not tell apart lead the path of the others astray."""
+    first, *rest = PLAIN.network.branches
+    half = replace(first, spring=replace(first.spring, modulus=0.5 * first.spring.modulus))
+    twins = replace(PLAIN, network=replace(PLAIN.network, branches=(half, half, *rest)))
+    problem, x, free = posed(twins, record_of(PLAIN, thesis_drive(rate=100.0)))
+    found = descend(problem, x, ~free)
+    estimates, _, _ = estimates_with_intervals(
+        problem, problem.layout.values(found.x), ~free, lambda _: None, lower_ends=False
+    )
+    alone = 1.96 / np.linalg.norm(problem.jacobian(found.x, free), axis=0)
+    fitted = [e for e, f in zip(estimates, free, strict=True) if f]
+    quantities = [q for q, f in zip(problem.layout.quantities, free, strict=True) if f]
+    for e, q, least in zip(fitted, quantities, alone, strict=True):
+        least *= 0.9 * (e.value if q.logarithmic else 1.0)
+        assert min(e.high - e.value, e.value - e.low) > least, e.name
