@@ -42,8 +42,8 @@ class LearningSettings:
         Readings about a spike. Their median is right with up to half of them wrong: bursts of 5.
     stuck_s
         Time in s of one and the same reading while the film is predicted to move by ``moved``
-        noises. Independent readings repeat with probability 0.28 each where a step of the reading
-        is the noise; 10 in a row at 200 Hz do once in 10^5 by chance.
+        noises. Where a step of the reading is the noise, independent readings repeat ten times in
+        a row, as at 200 Hz, at 2 of 10^5 places by chance.
     moved
         Noises that the prediction moves meanwhile: two steps of a reading whose noise is that of
         its steps alone, step/sqrt(12).

@@ -116,7 +116,7 @@ def _with_events(fitter: Fitter, judge: Judge, best: Fit) -> Fit:
         whole = _from_the_start(fitter, top, held)
         judge.see([whole])
         if judge.gain(whole, top) < fitter.settings.odds:
-            break  # all of the recording differs from the model: nothing happened in it
+            break  # the whole recording differs from the model: this is no event
         best = top
     return best
 
@@ -126,11 +126,9 @@ def _from_the_start(fitter: Fitter, fit: Fit, held: int) -> Fit:
     layout = fit.problem.layout
     values = layout.values(fit.x)
     values[-1] = fitter.records[0].time[0]
-    start = np.clip(layout.coordinates(values), layout.lower, layout.upper)
     fixed = np.arange(layout.size) < held
     fixed[-1] = True  # the moment
-    found = descend_broyden(fit.problem, start, fixed, None, _ITERATIONS, 1.0, True)
-    return fit_of(fit.problem, fixed, found)
+    return _fitted(fit.problem, values, fixed)
 
 
 def _with_event(fitter: Fitter, best: Fit, name: str, held: int) -> Fit:
@@ -159,7 +157,12 @@ def _with_event(fitter: Fitter, best: Fit, name: str, held: int) -> Fit:
         most = int(np.argmax(-size * (shape @ best.residuals)))
         values, at = rows[most], float(rows[most, -1])
         values[-2] = typical[-2] * size[most]
+    return _fitted(problem, values, np.arange(layout.size) < held)
+
+
+def _fitted(problem: WhitenedProblem, values: np.ndarray, fixed: np.ndarray) -> Fit:
+    """Return the fit from natural ``values`` (d,), of which the ``fixed`` ones stay."""
+    layout = problem.layout
     start = np.clip(layout.coordinates(values), layout.lower, layout.upper)
-    fixed = np.arange(layout.size) < held
     found = descend_broyden(problem, start, fixed, None, _ITERATIONS, 1.0, True)
     return fit_of(problem, fixed, found)

@@ -26,7 +26,7 @@ __all__ = [
 FILM_MODEL_ERROR = 5e-3
 
 _RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
-_QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
+_QUIET_MIN = 100  # samples at rest: fewer give the noise to worse than 1/sqrt(200) = 7 %
 _FILM_SAMPLES = 1500
 _LEVEL = 8  # neighbours on either side, whose mean is the level of a reading: 80 ms at 200 Hz
 _FAR = 0.05  # share of the noise at rest that is called far off
@@ -80,12 +80,6 @@ def with_model_error(record: Record) -> Record:
     return replace(record, noise=math.hypot(record.noise, error))
 
 
-def _rest_of(record: ActuatorRecord) -> np.ndarray:
-    """Return the indices (M,) of the readings at rest that may be used."""
-    rest = np.arange(record.lead_in)
-    return rest if record.valid is None else rest[record.valid[rest]]
-
-
 def without_tails(record: Record, residual: np.ndarray) -> Record:
     """Return ``record`` with pseudo-values in place of readings whose noise has heavy tails.
 
@@ -93,26 +87,28 @@ def without_tails(record: Record, residual: np.ndarray) -> Record:
     distribution of the noise at rest (``Tails.pseudo``). The noise of each reading is its
     ``residual`` (N,), measured less model in m, about the mean of its neighbours': what a model may
     still explain lasts longer than one reading. Readings stay as they are where several that follow
-    each other are far off, and all of them where more are so than at rest.
+    each other are far off, and all of them where twice as many are so as at rest.
     """
-    if not isinstance(record, ActuatorRecord) or _rest_of(record).size < _QUIET_MIN:
+    if not isinstance(record, ActuatorRecord):
         return record
-    rest = _rest_of(record)
+    usable = np.ones(residual.size, dtype=bool) if record.valid is None else record.valid
+    rest = np.flatnonzero(usable[: record.lead_in])
+    if rest.size < _QUIET_MIN:
+        return record
     at_rest, _ = about_rest(record.time[rest], record.displacement[rest])
     tails = tails_of(at_rest, 1.0 / correlation_time(at_rest))
     if tails.is_normal:
         return record
-    valid = np.ones(residual.size) if record.valid is None else record.valid.astype(float)
     about = np.ones(2 * _LEVEL + 1)
     about[_LEVEL] = 0.0
-    count = np.convolve(valid, about, "same")
-    level = np.convolve(valid * residual, about, "same") / np.maximum(count, 1.0)
+    count = np.convolve(usable, about, "same")
+    level = np.convolve(usable * residual, about, "same") / np.maximum(count, 1.0)
     noise = residual - level
-    far = (np.abs(noise) > tails.limit(_FAR)) & (valid > 0.0)
+    far = (np.abs(noise) > tails.limit(_FAR)) & usable
     if np.mean(far) > 2.0 * _FAR:
         return record
     alone = np.convolve(far, [1, 1, 0, 1, 1], "same") < _CROWD
-    change = np.where(alone & (valid > 0.0), tails.pseudo(noise) - noise, 0.0)
+    change = np.where(alone & usable, tails.pseudo(noise) - noise, 0.0)
     changed = counted(record.displacement + change, record.lead_in)
     # the tails are known from few readings: what they leave of the noise is read again
     left = noise_at_rest(record.time[rest], changed[rest])

@@ -19,6 +19,7 @@ from dearig.model.film import Strip
 from dearig.model.fitting.estimates import at_bound, is_determined
 from dearig.model.fitting.identify import coarse_problem, fit_globally
 from dearig.model.fitting.intervals import correlation_time
+from dearig.model.fitting.levenberg import gain_that_counts
 from dearig.model.fitting.parameters import NORMAL_95, Estimate, Layout, require_free
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress
@@ -31,7 +32,6 @@ _START_RECORDS = 3  # that a global search fits in common, for the start
 _ITERATIONS = 40
 _FLAT = 1e-12  # of the curvature: a flatter direction gets a variance that determines nothing
 _DAMPING_MIN, _DAMPING_MAX = 1e-9, 1e8
-_GAIN_MIN, _GAIN_MISFIT = 0.1, 0.01  # of chi-square, and of it over the samples, that end a descent
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ class _Many:
         for done in range(_ITERATIONS):
             report("descents", 1.0 - 0.8**done)
             normal = self.normal(x, owned, [1.0] * len(self.problems))
-            enough = max(_GAIN_MIN, _GAIN_MISFIT * chi2 / samples)
+            enough = gain_that_counts(chi2, samples)
             gained = 0.0
             while damping <= _DAMPING_MAX:
                 step, steps = normal.solve(damping)
@@ -208,7 +208,7 @@ class _Many:
                     break
                 damping *= 10.0
             if gained < enough:
-                return x, owned, damping <= _DAMPING_MAX or gained == 0.0
+                return x, owned, True
         return x, owned, False
 
 
@@ -234,9 +234,7 @@ def fit_shared(
     )
     start = Problem([records[i] for i in some], Layout(base), workers)
     require_free(start.layout, start.samples)
-    found, held = fit_globally(
-        start, None, lambda stage, part: progress(stage, 0.5 * part)
-    )  # fmt: skip
+    found, held = fit_globally(start, None, lambda stage, part: progress(stage, 0.5 * part))
     values = dict(zip(start.layout.names, start.layout.by_relaxation_time(
         start.layout.values(found.x)), strict=True))  # fmt: skip
     natural = layout.initial()

@@ -23,8 +23,9 @@ __all__ = [
 ]
 
 CHI2_95 = 3.841458820694124  #: 95 % of chi-square with one degree of freedom
-#: Eigenvalue of a normal matrix in units of its diagonal that tells of a direction: derivatives by
-#: differences are known to some 1e-5, and a smaller eigenvalue is their error.
+#: Least eigenvalue of a normal matrix, in units of its diagonal, of a direction that the data
+#: determine. Derivatives by differences are known to some 1e-5; a smaller eigenvalue is the square
+#: of their error.
 _TOLD = 1e-10
 _POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: tolerance of its crossing
@@ -106,7 +107,7 @@ def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:
 
 
 def _inverse(normal: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return the inverse of ``normal`` (f, f) by its eigenvalues in units of its diagonal."""
+    """Return the inverse of ``normal`` (f, f); ``of`` inverts its scaled eigenvalues."""
     if normal.size == 0:
         return normal
     seen = np.sqrt(np.diag(normal))
@@ -115,13 +116,9 @@ def _inverse(normal: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.n
     return np.asarray((q * of(w)) @ q.T / np.outer(scale, scale))
 
 
-def _least(normal: np.ndarray) -> np.ndarray:
-    """Return the pseudo-inverse of ``normal`` (f, f): what the data do not tell stays."""
-
-    def of(w: np.ndarray) -> np.ndarray:
-        return np.where(w > _TOLD, 1.0 / np.maximum(w, _TOLD), 0.0)
-
-    return _inverse(normal, of)
+def _pseudo_inverse(normal: np.ndarray) -> np.ndarray:
+    """Return the inverse of ``normal`` (f, f), 0 along directions that are not determined."""
+    return _inverse(normal, lambda w: np.where(w > _TOLD, 1.0 / np.maximum(w, _TOLD), 0.0))
 
 
 @dataclass(frozen=True)
@@ -149,7 +146,7 @@ def _path(
 ) -> _Path:
     """Return the path of coordinate ``index``; ``j`` (N, f) is the Jacobian of ``others``."""
     layout = problem.layout
-    inverse = _least(j.T @ j)
+    inverse = _pseudo_inverse(j.T @ j)
     probe = layout.differences(best)[index]
     first, second = np.zeros(layout.size), np.zeros(layout.size)
     first[index] = 1.0
@@ -213,7 +210,7 @@ def profile(
             )
             moved = path.start + np.clip(path.ahead(points) - path.start, -reach, reach)
             moved = np.where(held, best, np.clip(moved, layout.lower, layout.upper))
-            # where the data hardly tell of the others, the path leads astray: they may stay as well
+            # where the data hardly determine the others, the path is wrong: try them unmoved too
             both = np.stack([moved, np.tile(path.start, (points.size, 1))])
             both[..., index] = points
             costs = problem.costs(both.reshape(-1, layout.size)).reshape(2, -1)

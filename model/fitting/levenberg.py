@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 
 from dearig.model.fitting.problem import Problem
 
-__all__ = ["LocalFit", "descend"]
+__all__ = ["LocalFit", "descend", "gain_that_counts"]
 
 _DAMPINGS = np.array([1e-4, 1e-2, 1.0, 30.0])  # tried at once, relative to the current damping
 _DAMPING_MIN, _DAMPING_MAX = 1e-12, 1e8
@@ -88,9 +88,7 @@ def descend(
             break
         w, q = eigh((normal / np.outer(safe, safe))[np.ix_(move, move)])
         target = q.T @ (gradient / safe)[move]
-        enough = gain
-        if enough is None:
-            enough = max(_GAIN_MIN, _GAIN_MISFIT * chi2 / problem.samples)
+        enough = gain_that_counts(chi2, problem.samples) if gain is None else gain
         # gain that the quadratic model predicts, flat directions excepted
         if float(np.sum(target**2 / np.maximum(w, _FLAT))) < enough:
             converged = True
@@ -121,6 +119,14 @@ def descend(
         history.append(chi2)
         converged = len(history) > patience and history[-1 - patience] - chi2 < enough
     return LocalFit(x, chi2 / problem.samples, r, jac, done, converged)
+
+
+def gain_that_counts(chi2: float, samples: int) -> float:
+    """Return the least gain in ``chi2`` for which a descent goes on.
+
+    It is a tenth, or more where the residuals are far above the noise.
+    """
+    return max(_GAIN_MIN, _GAIN_MISFIT * chi2 / samples)
 
 
 def _bend(
