@@ -29,7 +29,7 @@ _CUT = 0.962  # standard deviation of a normal distribution without its largest 
 #: that is stretched is twice as soft as on average.
 _DRIVEN = 4.0
 
-#: Neighbours of a reading, and what projects off the parabolas and cubics through these.
+#: Neighbours of a reading, and what projects off the cubics through these.
 _REACH = 4
 _PLACES = np.delete(np.arange(-_REACH, _REACH + 1.0), _REACH)
 _CURVES = np.vander(_PLACES, 4, increasing=True)
@@ -37,8 +37,8 @@ _BESIDE = np.eye(_PLACES.size) - _CURVES @ np.linalg.pinv(_CURVES)
 #: The reading less the curve there; its noise, over that of one reading.
 _OFF = np.insert(-np.linalg.pinv(_CURVES)[0], _REACH, 1.0)
 _OFF_NOISE = math.sqrt(float(_OFF @ _OFF))
-#: Sum of the squares beside the curve, over the noise's, that normal noise exceeds once in a
-#: hundred times: four degrees of freedom.
+#: 99 % of chi-square with four degrees of freedom: squared deviations of the eight neighbours from
+#: their cubic of four coefficients, in sum over the variance of normal noise.
 _BESIDE_MAX = 13.3
 
 
@@ -66,7 +66,7 @@ def spikes(time: np.ndarray, signal: np.ndarray, pull: np.ndarray, quiet: int) -
 
 
 def _at_rest(time: np.ndarray, signal: np.ndarray) -> Tails:
-    """Return the distribution of the noise at rest; that of all but spikes where it is normal."""
+    """Return the distribution of the noise at rest, without spikes where the rest is normal."""
     noise, _ = about_rest(time, signal)
     size = np.abs(noise)
     middle = tails_of(noise[size <= np.quantile(size, 1.0 - _FEW)])
@@ -81,9 +81,9 @@ def _off(values: np.ndarray) -> np.ndarray:
 
 
 def _beside(signal: np.ndarray, i: int) -> float:
-    """Return how far the neighbours of reading ``i`` are beside their curve.
+    """Return the deviation of the neighbours of reading ``i`` from their curve.
 
-    Less than the noise of one reading, but for once in a hundred times.
+    It is scaled so that normal noise exceeds its own standard deviation once in a hundred times.
     """
     neighbours = np.delete(signal[i - _REACH : i + _REACH + 1], _REACH)
     return math.sqrt(float(neighbours @ _BESIDE @ neighbours) / _BESIDE_MAX)

@@ -1,4 +1,4 @@
-"""The page as an ASGI application: four files, and one stream that only sends."""
+"""The page as an ASGI application: six files, and one stream that only sends."""
 
 from __future__ import annotations
 
