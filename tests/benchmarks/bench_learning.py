@@ -1,9 +1,9 @@
 """What each number of the learning is worth: learning with it changed, on films that are known.
 
 Run as ``python -m tests.benchmarks.bench_learning``. The thesis's model learns on films that have
-one effect more, with noise of 1 um; some readings are drifting, coarse, late, spoilt or have a slip
-in one run. Printed are the errors of the film itself after five runs, over the noise. Then each
-variant changes one number of ``LearningSettings``: how many films come nearer to the path by a
+one effect more, with noise of 1 um; some readings drift, are coarse, stuck or missing, have spikes,
+or a slip in one run. Printed are the errors of the film itself after five runs, over the noise.
+Each variant changes one number of ``LearningSettings``: how many films come nearer to the path by a
 quarter of the noise or more, and how many are farther, the most by which, and which film that is.
 """
 

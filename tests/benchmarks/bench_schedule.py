@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import heapq
-import os
 import tempfile
 import time
 from contextlib import chdir
@@ -26,6 +25,7 @@ from dearig.batch.engines import LocalEngine
 from dearig.batch.fits import StudyOptions, Task, fit_task
 from dearig.batch.studies import Subject, study_recordings, subjects_of
 from tests.benchmarks.bench_study import made, nothing
+from tests.tools.machine import cores_and_load
 
 _LINK = 125e6  # byte/s: 1 Gbit/s
 _MESSAGE_S = 1e-3
@@ -97,9 +97,7 @@ def main() -> None:
             f"{workers:7d} {local:10.1f} {100.0 * ideal / local:11.1f} % {dask:9.1f} "
             f"{100.0 * ideal / dask:11.1f} %"
         )
-    print(f"{os.cpu_count()} cores" + (
-        f", load {os.getloadavg()[0]:.0f}" if hasattr(os, "getloadavg") else ""
-    ))  # fmt: skip
+    print(cores_and_load())
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -25,6 +24,7 @@ from dearig.batch.studies import study_recordings, subjects_of
 from dearig.config.rigfile import load_rig_file
 from dearig.config.sequencefile import parse_sequence
 from tests.tools.command import LOBE, SLOW_RIG, write
+from tests.tools.machine import cores_and_load
 
 
 def made(folder: Path, count: int) -> Path:
@@ -126,11 +126,7 @@ def main() -> None:
                 kill = after(1 / count, processes[which].kill)
                 tables.append(told(victim, engine=engine_at(f"dask:{address}"), progress=kill))
         print("the same table, to the last digit:", all(table == tables[0] for table in tables))
-    print(
-        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.0f}"
-        if hasattr(os, "getloadavg")
-        else ""
-    )
+    print(cores_and_load())
 
 
 if __name__ == "__main__":

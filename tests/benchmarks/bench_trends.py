@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import time
 from collections import Counter
 from dataclasses import replace
@@ -26,6 +25,7 @@ from dearig.model.actuator import Actuator
 from dearig.model.fitting import fit_shared
 from dearig.model.material import Network
 from tests.tools.engine import PLAIN, record_of, thesis_drive
+from tests.tools.machine import cores_and_load
 from tests.tools.made_campaign import TRUTH, made_rows
 
 OF_THE_ROOM = ("temperature", "humidity")
@@ -170,9 +170,7 @@ def main() -> None:
     singles(max(campaigns // 5, 1))
     series_without_change(1000)
     large(100, 100)
-    print(f"{os.cpu_count()} cores" + (
-        f", load {os.getloadavg()[0]:.0f}" if hasattr(os, "getloadavg") else ""
-    ))  # fmt: skip
+    print(cores_and_load())
 
 
 if __name__ == "__main__":
