@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from dearig.acquisition.run import RunResult
-from dearig.batch.queue import DONE, LOST, RUNNING, STOPPED, WAITING, RunState
+from dearig.batch.queue import DONE, LOST, STOPPED, RunState
 from dearig.config.notify import Event, Notify, redacted
 from dearig.errors import DearigError, InstrumentFault, SafetyStop
 from dearig.output_state import OutputState
@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 FORMAT = "dearig-notification/1"
 #: Time in s after which a command is killed, and after which no answer of a webhook is awaited.
 COMMAND_LIMIT, WEBHOOK_LIMIT = 30.0, 10.0
-#: Notifications under way at once, at most: runs may end faster than somebody can be told.
+#: Notifications under way at once, at most: runs may end faster than notifications are delivered.
 UNDER_WAY_MAX = 4
 #: Bytes of what a failed command wrote that are logged.
 _TOLD = 300
@@ -57,7 +57,7 @@ def _of_run(
     output: OutputState | None = None,
     numbers: dict[str, float] | None = None,
 ) -> dict[str, Any]:
-    """Return what is told of a run."""
+    """Return the entry ``run`` of a notification."""
     return {
         "name": name,
         "state": state,
@@ -68,25 +68,10 @@ def _of_run(
     }
 
 
-def _of_campaign(outcome: CampaignOutcome) -> dict[str, Any]:
-    """Return what is told of a campaign."""
-    queue = outcome.queue
-    return {
-        "name": outcome.name,
-        "folder": str(outcome.folder),
-        "status": outcome.status,
-        "reason": outcome.reason,
-        "planned": len(queue.runs),
-        "done": queue.count(DONE),
-        "failed": queue.count(LOST, STOPPED),
-        "waiting": queue.count(WAITING, RUNNING),
-    }
-
-
 class Notifier:
-    """Tells what ``notify`` asks for; ``await_notifications`` waits for what is under way.
+    """Sends the notifications of ``notify``; ``await_notifications`` waits for those under way.
 
-    Raises ``InputError`` where nobody could be told. ``now`` is Unix time in s.
+    Raises ``InputError`` for a command or a webhook that cannot work. ``now`` is Unix time in s.
     """
 
     def __init__(
@@ -128,7 +113,7 @@ class Notifier:
 
     def _has_place(self, event: Event) -> bool:
         _under_way[:] = [thread for thread in _under_way if thread.is_alive()]
-        # no run follows the end of a queue: it is told in any case
+        # never dropped: no later notification follows the end of a queue
         if len(_under_way) < UNDER_WAY_MAX or event == "queue-stopped":
             return True
         self._failed("notifications", f"{UNDER_WAY_MAX} are under way, and this one is left out")
@@ -147,8 +132,8 @@ class Notifier:
         log.log(level, "%s: %s", what, why)
 
     def tell_stop(self, outcome: CampaignOutcome) -> None:
-        """Tell how a campaign stands after which no run follows."""
-        facts = _of_campaign(outcome)
+        """Tell that no run of a campaign follows, and how the campaign stands."""
+        facts = outcome.summary()
         reason = f": {outcome.reason}" if outcome.reason else ""
         self.tell(
             "queue-stopped",
@@ -169,7 +154,7 @@ class Notifier:
             run=_of_run(
                 run.name, how, str(outcome.folder / run.recording), run.reason, output, run.numbers
             ),
-            campaign=_of_campaign(outcome),
+            campaign=outcome.summary(),
         )
 
     def tell_of(self, path: Path, play: Callable[[], RunResult]) -> RunResult:
@@ -268,12 +253,12 @@ class Notifier:
         self._failed(what, why)
 
 
-#: What is under way in this process.
+#: Threads of the notifications under way in this process.
 _under_way: list[threading.Thread] = []
 
 
 def await_notifications() -> None:
-    """Wait for what is under way, within its time limits; ctrl-C ends the wait."""
+    """Wait for the notifications under way, within their time limits; ctrl-C ends the wait."""
     end = time.monotonic() + max(COMMAND_LIMIT, WEBHOOK_LIMIT) + 1.0
     told = False
     with contextlib.suppress(KeyboardInterrupt):

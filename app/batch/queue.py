@@ -259,6 +259,20 @@ class CampaignOutcome:
     status: str
     reason: str
 
+    def summary(self) -> dict[str, Any]:
+        """Return name, folder, status and numbers of runs, as reports and notifications have it."""
+        queue = self.queue
+        return {
+            "name": self.name,
+            "folder": str(self.folder),
+            "status": self.status,
+            "reason": self.reason,
+            "planned": len(queue.runs),
+            "done": queue.count(DONE),
+            "failed": queue.count(LOST, STOPPED),
+            "waiting": queue.count(WAITING, RUNNING),
+        }
+
 
 def _name(value: Any) -> str:
     """Return the name of a file of a campaign. Raises ``ValueError`` for what is none."""
@@ -268,5 +282,5 @@ def _name(value: Any) -> str:
 
 
 def sha256_of(text: str) -> str:
-    """Return what tells a plan or a rig file from another one."""
+    """Return the SHA-256 of ``text``, by which a changed plan or rig file is recognised."""
     return hashlib.sha256(text.encode()).hexdigest()

@@ -54,14 +54,7 @@ def campaign_json(outcome: CampaignOutcome) -> dict[str, Any]:
     queue = outcome.queue
     return {
         "format": "dearig-campaign/1",
-        "name": outcome.name,
-        "folder": str(outcome.folder),
-        "status": outcome.status,
-        "reason": outcome.reason,
-        "planned": len(queue.runs),
-        "done": queue.count(DONE),
-        "failed": queue.count(LOST, STOPPED),
-        "waiting": queue.count(WAITING, RUNNING),
+        **outcome.summary(),
         "skipped": queue.count(SKIPPED),
         "needs_acknowledgement": queue.halted or None,
         "runs": [
