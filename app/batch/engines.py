@@ -40,7 +40,8 @@ log = logging.getLogger(__name__)
 #: Times that a task is tried alone whose worker died, before it counts as the cause.
 _TRIES_ALONE = 2
 _DASK_TIMEOUT = "10 s"  # to find the scheduler
-_RETRIES = 3  # of a task by Dask when its worker is lost: by then it may be the cause
+#: Times that Dask gives a task to another worker after its worker died; then it may be the cause.
+_RETRIES = 3
 _LOOK_S = 5.0  # between two looks at whether there are workers
 _NO_WORKER_S = 30.0  # without a worker after which nobody waits for one
 _ANSWER_S = 30.0  # for a row that is computed to come from its worker

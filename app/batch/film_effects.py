@@ -1,4 +1,4 @@
-"""What single films do otherwise: slopes of their own, and jumps from one run to the next."""
+"""Deviations of single films: slopes of their own, and jumps from one run to the next."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Explained:
 
 
 def explain(sample: Sample, films: tuple[str, ...], relative: bool) -> Explained:
-    """Return the model of ``sample`` with what single films do otherwise.
+    """Return the model of ``sample`` with the deviations of single films.
 
     Own slopes and jumps compete: those that explain most beyond what chance does are taken first,
     since each looks like the other in a few runs, and since one film's own slope moves the common

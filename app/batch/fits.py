@@ -159,7 +159,7 @@ def _row(path: Path, name: str, options: StudyOptions, progress: Progress) -> Ro
 
 
 def about(path: Path) -> Row:
-    """Return what the columns before the results are of."""
+    """Return the columns that describe the recording: hash, start, film, rig, duration, ..."""
     entry = glance(path, path.name, path.stat().st_size)
     if entry.trouble:
         raise InputError(entry.trouble)

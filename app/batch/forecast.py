@@ -23,10 +23,9 @@ class Forecast:
 
     ``durations`` in s, ``sizes`` in bytes of the recordings that are kept, ``digests`` and
     ``refused`` (why a run cannot be played, "" for one that can) are of the runs, in their order.
-    ``seconds`` is the time of
-    all runs and rests, without computations between them; ``size`` the bytes of the recordings
-    that are kept, with one more that is not reduced yet; ``free`` the free bytes of the disk.
-    ``margins`` are the smallest distances to each limit of the gate.
+    ``seconds`` is the time of all runs and rests, without computations between them; ``size`` the
+    bytes of the recordings that are kept, with one more that is not reduced yet; ``free`` the free
+    bytes of the disk. ``margins`` are the smallest distances to each limit of the gate.
     """
 
     durations: tuple[float, ...]

@@ -9,7 +9,7 @@ from typing import Any
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
 from dearig.units import SHOWN, parameter_unit
 
-__all__ = ["errors_of", "numbers_of", "parameters_of", "told"]
+__all__ = ["errors_of", "numbers_of", "parameter_of", "parameters_of"]
 
 
 def parameters_of(outcome: IdentifyOutcome | DiagnoseOutcome) -> list[dict[str, Any]]:
@@ -25,11 +25,11 @@ def parameters_of(outcome: IdentifyOutcome | DiagnoseOutcome) -> list[dict[str, 
         estimates = [
             (f"{step.effect}.", e) for step in outcome.finding.steps for e in step.estimates
         ]
-    return [told(estimate, before) for before, estimate in estimates]
+    return [parameter_of(estimate, before) for before, estimate in estimates]
 
 
-def told(estimate: Any, before: str = "") -> dict[str, Any]:
-    """Return an estimate as in ``parameters_of``; its name begins with that of an effect."""
+def parameter_of(estimate: Any, before: str = "") -> dict[str, Any]:
+    """Return one entry of ``parameters_of``; ``before`` is put before a name without an effect."""
     factor, unit = parameter_unit(estimate.unit)
     name = estimate.name.replace(": ", ".").replace(" ", "_")
     if "." not in name:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dearig.analysis.shared import identify_shared
 from dearig.batch.fits import ONE_AT_A_TIME, Row, StudyOptions, Task, about, parameter_columns
-from dearig.batch.numbers import errors_of, told
+from dearig.batch.numbers import errors_of, parameter_of
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import one_line
@@ -94,7 +94,7 @@ def _fit(
         rows[name] |= {
             "state": "ok",
             "fitted_together": len(fitted),
-            **parameter_columns([told(estimate) for estimate in outcome.estimates]),
+            **parameter_columns([parameter_of(estimate) for estimate in outcome.estimates]),
             **errors_of(outcome.comparison),
             "converged": outcome.converged,
         }

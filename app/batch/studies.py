@@ -250,7 +250,7 @@ def _table(
     cached: int,
     moved: str,
 ) -> StudyTable:
-    """Write the rows in the order of their starts, with what is known beside the recordings."""
+    """Write the rows, sorted by start time, with the columns ``beside`` of their subjects."""
     made = [{**rows[s.name], **s.beside} for s in subjects]
     made.sort(key=lambda row: (str(row.get("started", "")), row["recording"]))
     table = out / "study.csv"

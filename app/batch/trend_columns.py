@@ -18,7 +18,7 @@ from dearig.errors import InputError
 
 __all__ = ["Column", "Design", "columns_in", "days_of_films", "design_of", "films_in"]
 
-#: Label, unit, column of the table, and range below which it is hardly varied.
+#: Label, unit, column of the table, and range below which it counts as hardly varied.
 _ENVIRONMENT = (
     ("temperature", "°C", "temperature_degC", 3.0),
     ("humidity", "% RH", "relative_humidity_percent", 10.0),
@@ -29,7 +29,8 @@ _RIGS_MAX = 8  # more rigs than these are not compared one by one
 #: Part of a column's variance that the columns before it explain, above which it is left out: its
 #: interval would be ten times as wide as by itself.
 _CONFOUNDED = 0.99
-#: Correlation of two columns above which an experiment should separate them.
+#: Correlation of two columns above which an experiment should separate them: there the interval of
+#: each is 1/sqrt(1 - 0.8^2) = 1.7 times as wide as without the other one.
 _ENTANGLED = 0.8
 
 
@@ -37,7 +38,7 @@ _ENTANGLED = 0.8
 class Column:
     """A column that may change the numbers: ``values`` (n,) of all rows, NaN where not known.
 
-    A number is told per ``unit``; ``hardly`` is the range below which it is hardly varied.
+    Slopes are given per ``unit``. A range smaller than ``hardly`` counts as hardly varied.
     """
 
     label: str
@@ -55,13 +56,16 @@ class Column:
 class Design:
     """Columns whose effects are estimated together, and sentences on those that are not.
 
-    ``entangled`` are pairs of columns with their correlation, where it is large.
+    ``entangled`` are pairs of columns with their correlation, where it is large. ``missing`` and
+    ``constant`` are labels of columns that are left out because too few runs have a value, and
+    because all runs have the same value.
     """
 
     columns: tuple[Column, ...]
     left_out: tuple[str, ...]
     entangled: tuple[tuple[str, str, float], ...]
     missing: tuple[str, ...]
+    constant: tuple[str, ...]
 
 
 def films_in(rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -167,6 +171,7 @@ def design_of(columns: Sequence[Column], used: np.ndarray) -> Design:
     kept: list[Column] = []
     left_out: list[str] = []
     missing: list[str] = []
+    constant: list[str] = []
     basis = [np.ones(int(used.sum()))]
     for column in columns:
         values = column.values[used]
@@ -177,6 +182,7 @@ def design_of(columns: Sequence[Column], used: np.ndarray) -> Design:
         filled = np.where(np.isfinite(values), values, np.nanmean(values))
         spread = float(np.std(filled))
         if spread <= 1e-9 * max(float(np.max(np.abs(filled))), 1e-300):
+            constant.append(column.label)
             left_out.append(f"{column.label}: the same in all runs, so that it shows no effect.")
             continue
         standard = (filled - filled.mean()) / spread
@@ -202,4 +208,4 @@ def design_of(columns: Sequence[Column], used: np.ndarray) -> Design:
         for b, y in list(zip(kept, basis[1:], strict=True))[i + 1 :]
         if abs(float(np.mean(x * y))) > _ENTANGLED
     ]
-    return Design(tuple(kept), tuple(left_out), tuple(entangled), tuple(missing))
+    return Design(tuple(kept), tuple(left_out), tuple(entangled), tuple(missing), tuple(constant))

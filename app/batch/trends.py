@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 
 from dearig.analysis.cores import for_simulations
 from dearig.batch.film_effects import DIFFER, Explained, explain
@@ -47,7 +48,7 @@ __all__ = [
 
 log = logging.getLogger(__name__)
 
-#: What is said of an effect, by its key.
+#: Verdicts on an effect as a table shows them, by their keys.
 VERDICTS = {
     "common": "common",
     "one_film": "one film's own",
@@ -56,11 +57,11 @@ VERDICTS = {
     "none": "not seen",
     "untold": "one film only",
 }
-#: Errors of the model that are trended, beside the parameters.
+#: Errors of the model, and the peak displacement: their trends are found like those of parameters.
 _ERRORS = ("rms_um", "rms_kPa", "nrmse_pct", "peak_displacement_mm")
 _RUNS_MIN = 5  # with a value, for a trend
 _SIGNIFICANT = 0.05
-_QUANTILE_95 = 1.959963984540054
+_QUANTILE_95 = float(norm.ppf(0.975))  # an interval of 95 % leaves out 2.5 % on either side
 
 
 @dataclass(frozen=True)
@@ -269,7 +270,7 @@ def write_trends(trends: Trends, folder: Path) -> dict[str, Path | None]:
 
 
 def numbers_in(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the numbers of a table that are trended: parameters with an interval, and errors."""
+    """Return the numbers whose trends are found: parameters with an interval, and errors."""
     names = dict.fromkeys(name for row in rows for name in row)
     return [name for name in names if f"{name}_low95" in names or name in _ERRORS]
 
@@ -287,7 +288,7 @@ def find_trends(
 
     ``numbers`` and ``against`` name columns of the table, by default all parameters and errors, and
     temperature, humidity, cycles, days, settings and rig. Parameters that the data of a recording
-    do not determine are left out. Raises ``InputError`` where nothing can be trended.
+    do not determine are left out. Raises ``InputError`` where no number has a trend.
     """
     if not rows or "recording" not in rows[0]:
         raise InputError(f"{source} is not a table of a study: it has no rows with recordings")
@@ -371,7 +372,7 @@ def _trend(
     design = replace(design, columns=local)
     names = tuple(films[int(at[film == f][0])] for f in range(sample.films))
     model = explain(sample, names, relative)
-    effects = tuple(_effect(model, model.fit, local, i) for i in range(len(local)))
+    effects = tuple(_effect(model, column, i) for i, column in enumerate(local))
     changes = tuple(_changes(rows, at, model))
     return Trend(name, at, values, low, high, design, model, effects, changes)
 
@@ -399,9 +400,9 @@ def _high(row: Mapping[str, Any], name: str) -> float:
     return float(value + (value - _low(row, name)) if high is None else high)
 
 
-def _effect(model: Explained, fit: LinearFit, columns: Sequence[Column], i: int) -> Effect:
-    """Return the effect of column ``i``, and which films have another one."""
-    sample, told = model.sample, model.told
+def _effect(model: Explained, column: Column, i: int) -> Effect:
+    """Return the effect of ``column``, of place ``i``, and which films have another one."""
+    sample, fit, told = model.sample, model.fit, model.told
     p_equal = slopes_differ(sample, fit.variances, i) if sample.films > 1 else None
     places = model.slopes_of(i)
     verdict = "common" if sample.films > 1 else "untold"
@@ -415,8 +416,7 @@ def _effect(model: Explained, fit: LinearFit, columns: Sequence[Column], i: int)
         verdict = "none"
     own = tuple(_own_slope(model, i, place) for place in places)
     return Effect(
-        columns[i], told(slope), told(low), told(high), float(fit.p_values[i]), p_equal, verdict,
-        own,
+        column, told(slope), told(low), told(high), float(fit.p_values[i]), p_equal, verdict, own,
     )  # fmt: skip
 
 

@@ -114,7 +114,7 @@ def main() -> None:
 
 
 def _await_notifications() -> None:
-    """Wait until those who want to know are told how a run ended; the person here knows."""
+    """Wait until notifications are delivered, within their time limits."""
     notify = sys.modules.get("dearig.batch.notify")
     if notify is not None:
         notify.await_notifications()

@@ -162,6 +162,7 @@ def _look(view: SourceWatch, console: Console) -> RenderableType:
 def _recording_lines(state: Seen, ascii_only: bool) -> Iterator[RenderableType]:
     from rich.text import Text
 
+    from dearig.batch.watching import RECENT
     from dearig.printable import printable
     from dearig.report.watch_state import in_order, shown_channel
 
@@ -174,15 +175,14 @@ def _recording_lines(state: Seen, ascii_only: bool) -> Iterator[RenderableType]:
     if state.trouble:
         yield Text(printable(state.trouble), style="yellow")
     for name in in_order(state):
-        label, factor, unit, digits = shown_channel(name, state.described)
-        form = "10.4g" if digits is None else f"10.{digits}f"
-        now, peak = state.now[name] * factor, state.peak[name] * factor
-        text = f"  {label:13s} {now:{form}} {unit:4s}  peak {peak:{form}}"
+        shown = shown_channel(name, state.described)
+        now, peak = shown.text(state.now[name]), shown.text(state.peak[name])
+        text = f"  {shown.label:13s} {now:>10s} {shown.unit:4s}  peak {peak:>10s}"
         if ascii_only:
             text = text.replace("\u00b0", "deg").encode("ascii", "replace").decode()
         yield Text(printable(text))
     if "displacement" in state.recent:
-        yield Text(f"  last {'20 s':10s} {_bars(state, ascii_only)}")
+        yield Text(f"  last {f'{RECENT:g} s':10s} {_bars(state, ascii_only)}")
     for event in state.events[-_EVENTS:]:
         yield Text(printable(f"  {event.time:8.2f} s  {event.level}: {event.message}"))
 

@@ -17,7 +17,7 @@ __all__ = ["EVENTS", "Notify", "NotifyTable", "redacted"]
 
 Event = Literal["run-ended", "tripped", "queue-stopped"]
 
-#: What can be told: a run has ended; one has ended so that a person must look; no run follows.
+#: Events: a run has ended; a run has ended so that a person must look; no further run follows.
 EVENTS: tuple[Event, ...] = ("run-ended", "tripped", "queue-stopped")
 #: Begins the name of a variable of the environment that has the address.
 _VARIABLE = "env:"
@@ -54,7 +54,8 @@ class Notify:
     def checked(self) -> Notify:
         """Return the settings with the program's path and the webhook's address.
 
-        Raises ``InputError`` for what could never be told: then nobody would notice, for days.
+        Raises ``InputError`` for a command or an address that cannot work: without this check
+        nobody would notice it until a campaign of days ends.
         """
         command = self.command
         if command:

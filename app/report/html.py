@@ -30,6 +30,7 @@ from dearig.report.sentences import (
     warnings_of,
 )
 from dearig.report.tables import (
+    WORD_MAX,
     Table,
     branch_trials,
     by_thesis_table,
@@ -60,8 +61,6 @@ __all__ = [
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 #: Sections from which on a page has a list of them.
 _CONTENTS_MIN = 4
-#: Characters of a word that fits on a phone beside the columns of a table.
-_WORD_MAX = 18
 #: Places after separators, where a long name may be broken.
 _SEPARATED = re.compile(r"(?<=[-.:,;=@+])(?=[^\W\d])|(?<=[_/\\])(?=\w)")
 #: Where the list of contents is put; escaped text cannot contain it.
@@ -221,7 +220,7 @@ def _shown(value: object) -> object:
     return printable(str(value), "\n\t") if is_text else value
 
 
-def _breakable(name: str, longest: int = _WORD_MAX) -> Markup:
+def _breakable(name: str, longest: int = WORD_MAX) -> Markup:
     """Return ``name`` as HTML whose words of more than ``longest`` characters can be broken.
 
     They break after separators, and within only where a part is still longer.

@@ -125,7 +125,7 @@ def _spring_sentence(candidates: Sequence[SpringCandidate]) -> list[str]:
         if kind != chosen and p >= _LIKELY
     )
     return [
-        f"Of {len(odds)} strain energies the training data ask for {spring_name(chosen)}, with "
+        f"Of {len(odds)} strain energies the training data give {spring_name(chosen)} the "
         f"probability {odds[chosen]:.2f}" + (f"; not excluded: {rest}." if rest else ".")
     ]
 

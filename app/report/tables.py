@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BOUND_MARK",
+    "WORD_MAX",
     "Row",
     "Table",
     "branch_trials",
@@ -30,7 +31,7 @@ __all__ = [
 
 
 #: Characters of a table's line on a phone of 390 pixels, and of a word that is not broken there.
-_PHONE_WIDTH, _WORD_MAX = 46, 18
+_PHONE_WIDTH, WORD_MAX = 46, 18
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Table:
             )
             for i, (head, cells) in enumerate(zip(self.head, columns, strict=False))
         ]
-        return sum(min(width, _WORD_MAX) + 1 for width in widths) > _PHONE_WIDTH
+        return sum(min(width, WORD_MAX) + 1 for width in widths) > _PHONE_WIDTH
 
     def beside(self, other: Table) -> Table:
         """Return both tables as one. Raises ``ValueError`` unless they have the same rows."""

@@ -106,7 +106,7 @@ def trends_sentences(trends: Trends) -> Iterator[str]:
 
 def _models(trends: Trends) -> Iterator[str]:
     whys = dict.fromkeys(t.fit.why for t in trends.trends if not t.fit.mixed)
-    if len(whys) < len({t.fit.why for t in trends.trends}):
+    if any(t.fit.mixed for t in trends.trends):
         yield (
             "Each number is fitted by a linear mixed model with a random intercept of each film. "
             "A run has the weight of its own error and of the scatter beyond it."

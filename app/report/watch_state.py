@@ -22,6 +22,11 @@ class ShownChannel(NamedTuple):
     unit: str
     digits: int | None
 
+    def text(self, value: float) -> str:
+        """Return ``value``, in SI units, as text in ``unit``."""
+        form = ".4g" if self.digits is None else f".{self.digits}f"
+        return f"{value * self.factor:{form}}"
+
 
 _CHANNELS = {
     "voltage_command": ShownChannel("command", 1e-3, "kV", 3),

@@ -63,7 +63,7 @@ class Guard:
             await self._app(scope, receive, send)
             return
         if scope["type"] != "http":
-            # nothing but GET is spoken here
+            # a websocket: the page needs none
             await send({"type": "websocket.close", "code": 1008})
             return
 

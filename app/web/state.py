@@ -43,12 +43,11 @@ def look(watch: SourceWatch) -> tuple[dict[str, Any], float | None]:
         trouble = str(error)
     state, outcome = watch.recording, watch.outcome
     changed = None if state is None or not math.isfinite(state.changed) else state.changed
-    alarms = list(_alarms(state, outcome))
     return {
         "format": "dearig-watch-page/1",
         "source": _text(watch.source.resolve().name),
         "trouble": _text(trouble),
-        "alarms": [_text(alarm) for alarm in alarms],
+        "alarms": [_text(alarm) for alarm in _alarms(state, outcome)],
         "campaign": None if outcome is None else _campaign(outcome),
         "recording": None if state is None else _recording(state),
     }, changed
@@ -124,17 +123,9 @@ def _recording(state: Seen) -> dict[str, Any]:
 
 
 def _channel(state: Seen, name: str, shown: ShownChannel) -> dict[str, Any]:
-    def number(value: float) -> str:
-        digits = shown.digits
-        return (
-            f"{value * shown.factor:.4g}"
-            if digits is None
-            else (f"{value * shown.factor:.{digits}f}")
-        )
-
     return {
         "label": _text(shown.label), "unit": _text(shown.unit),
-        "value": number(state.now[name]), "peak": number(state.peak[name]),
+        "value": shown.text(state.now[name]), "peak": shown.text(state.peak[name]),
     }  # fmt: skip
 
 
@@ -167,7 +158,8 @@ def _line(bins: Bins, shown: ShownChannel) -> dict[str, Any]:
     start, low, high = bins.dense()
     low, high = low * shown.factor, high * shown.factor
     largest = float(np.nanmax(np.abs([low, high]), initial=0.0)) if low.size else 0.0
-    # a five hundredth of a pixel
+    # between 1e-5 and 1e-4 of the largest value: at most a fiftieth of a pixel where a plot, which
+    # is 170 pixels high, begins at 0
     digits = 5 - math.ceil(math.log10(largest)) if largest else 0
     return {
         "start": round(start, 6),

@@ -19,7 +19,7 @@ import numpy as np
 
 from dearig.batch.changes import find_jumps, jump_penalty
 from dearig.batch.fits import parameter_columns
-from dearig.batch.numbers import told
+from dearig.batch.numbers import parameter_of
 from dearig.batch.trends import find_trends
 from dearig.model.actuator import Actuator
 from dearig.model.fitting import fit_shared
@@ -119,7 +119,7 @@ def fitted(films: int, days: int = 6) -> None:
         for (t, h), estimates in zip(room, fit.estimates, strict=True):
             row = {"recording": f"{len(rows):03d}", "film": f"F{film}", "temperature_degC": t,
                    "relative_humidity_percent": h}  # fmt: skip
-            row |= parameter_columns([told(each) for each in estimates])
+            row |= parameter_columns([parameter_of(each) for each in estimates])
             rows.append(row)
     took = time.process_time() - began
     print(

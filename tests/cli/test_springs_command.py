@@ -41,7 +41,7 @@ def test_the_energy_that_made_the_data_is_kept(pulls: Path, tmp_path: Path) -> N
         "--json", out,
     )  # fmt: skip
     assert "Strain energies" in answer.out
-    assert "ask for Ogden" in answer.out.replace("\n", " ")
+    assert "give Ogden the probability" in answer.out.replace("\n", " ")
     kept = load_model(model).model.network
     assert kept.equilibrium.kind == "ogden"
     assert kept.equilibrium.shape[0] == pytest.approx(1.2, abs=0.02)
