@@ -1,4 +1,4 @@
-"""Which strain energy the records ask for: the criterion of a diagnosis, between baselines."""
+"""Choose the strain energy that is most probable by the records: the criterion of a diagnosis."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["SpringTrial", "choose_springs"]
 
 @dataclass(frozen=True)
 class SpringTrial:
-    """One model without effects, fitted to the records that all candidates are compared on.
+    """One candidate, fitted to the records that all candidates are compared on.
 
     ``kind`` is the strain energy of its equilibrium spring, as it was asked for.
     ``criterion`` is that of ``diagnosis.evidence``, less the least one of all candidates.
@@ -74,7 +74,7 @@ def choose_springs(
             refused.append(error)
     if not fits:
         raise refused[0]
-    # the candidate that explains least, so that what a law explains is counted for all alike
+    # over the candidate that explains least: the error of a law's form counts for all alike
     judge = Judge(settings, max(fits, key=lambda f: f.cost))
     judge.see(fits)
     criteria = np.array([judge.criterion(f) for f in fits])
@@ -89,7 +89,7 @@ def choose_springs(
 def _beside(candidate: Actuator | Strip, fits: Sequence[Fit]) -> Network | None:
     """Return a start of a ``candidate``: its equilibrium spring beside the best branches so far.
 
-    So that a law with more numbers, or more branches, does not fit worse by its starts alone.
+    With it a law with more parameters, or more branches, does not fit worse by its starts alone.
     """
     network = candidate.network
     known = [
@@ -115,8 +115,8 @@ def _with_free_shape(
 ) -> Fit:
     """Return the fitted model, the shape of its equilibrium spring too; ``nested`` is one start.
 
-    The evidence charges for it, so it is not held where it explains little. At an actuator's strain
-    the branches do not show theirs.
+    The criterion charges for each parameter, so the shape is not held where it explains little. At
+    an actuator's strain the shapes of the branches are not determined, and are held.
     """
     if not fitter.of_actuator:
         problem = fitter.problem(fitter.base)
