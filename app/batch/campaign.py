@@ -109,7 +109,7 @@ def play_campaign(
     ``ended`` is called with the outcome before an error is raised, ``noted`` with the entries that
     are in the journal, and then with each new one. ``interrupts`` lets another thread end the run
     and the campaign; by default ctrl-C does. ``computing`` stands in for ``compute`` after each
-    run. ``notify`` says whom to tell, by default those that the plan names.
+    run. ``notify`` are the settings of notifications, by default those of the plan.
 
     Raises ``InputError`` before anything is played, and for a run that the gate refuses at its
     turn; ``SafetyStop``, ``InstrumentFault`` or ``NotSafe`` where a run ended so that a person must

@@ -96,7 +96,7 @@ def explain(sample: Sample, films: tuple[str, ...], relative: bool) -> Explained
 
 
 def _taken(tried: list[tuple[float, Extra]], films: int, extras: list[Extra]) -> list[Extra]:
-    """Return what is taken of ``tried``, in falling order of gain: of each film one at most."""
+    """Return those of ``tried``, in falling order of gain, that are added: one a film at most."""
     taken: list[Extra] = []
     for gain, extra in tried:
         if gain <= 0.0 or gain < _SHARE_MIN * tried[0][0]:

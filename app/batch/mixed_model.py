@@ -346,7 +346,7 @@ def _scaled(sample: Sample, variances: np.ndarray) -> np.ndarray:
 
 
 def _sum_of_squares(y: np.ndarray, x: np.ndarray) -> tuple[float, int]:
-    """Return what is left of y (n,) after the columns (n, p), and their rank."""
+    """Return the residual sum of squares of y (n,) by columns (n, p), and their rank."""
     solution, rank = _solved(y, x)
     left = y - x @ solution
     return float(left @ left), rank

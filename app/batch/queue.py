@@ -196,7 +196,7 @@ class Queue:
     def changed(
         self, campaign: Campaign, digests: Sequence[str], address: str, configuration: str
     ) -> str:
-        """Return what is not as when the campaign began, "" where it can be continued.
+        """Return what has changed since the campaign began, "" where it can be continued.
 
         ``digests`` are those of the sequences of all runs, ``configuration`` is the rig file.
         """

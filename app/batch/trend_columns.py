@@ -164,7 +164,7 @@ def _rigs(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
 
 
 def design_of(columns: Sequence[Column], used: np.ndarray) -> Design:
-    """Return what can be estimated together on the rows ``used`` (n,) bool.
+    """Return the columns that can be estimated together on the rows ``used`` (n,) bool.
 
     A column that is constant, or that follows from those before it, is left out.
     """

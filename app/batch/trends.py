@@ -1,7 +1,8 @@
 """Trends of the numbers of many recordings: what changes them, in all films or in one.
 
-A study's table gives parameters with their intervals, errors, and what was beside them. Each number
-is fitted by a mixed model with the columns as common effects and a random intercept of each film.
+A study's table gives parameters with their intervals, errors, and the conditions of each run. Each
+number is fitted by a mixed model with the columns as common effects and a random intercept of each
+film.
 """
 
 from __future__ import annotations
@@ -185,7 +186,7 @@ class Trend:
 
 @dataclass(frozen=True)
 class Trends:
-    """Trends of a table: its ``rows``, their ``films``, the trend of each number, what is next.
+    """Trends of a table: its ``rows``, their ``films``, the trend of each number, and proposals.
 
     ``left_out`` are sentences on columns and numbers without a trend. ``days`` (n,) are the days of
     each row since the first one of its film.

@@ -208,8 +208,8 @@ NotifyOn = Annotated[
     list[NotifyEvent] | None,
     typer.Option(
         "--notify-on",
-        help="What is told: the end of a run, one that a person must look at, the end of the "
-        "queue. Can be repeated.",
+        help="Events to report: the end of a run, a run that a person must look at, the end of "
+        "the queue. Can be repeated.",
         show_default="all",
     ),
 ]
@@ -218,7 +218,7 @@ NotifyOn = Annotated[
 def notify_from(
     command: str | None, webhook: str | None, on: list[NotifyEvent] | None, plan: Notify
 ) -> Notify:
-    """Return whom to tell: what the options say, and of the rest what the ``plan`` says.
+    """Return the settings of notifications: the options, and for the others those of ``plan``.
 
     Raises ``InputError`` for a command whose quotes do not match.
     """

@@ -95,7 +95,7 @@ branches = 3                    # of the fitted model
 every = 1                       # keep the recording of every n-th run; 1 keeps all
 every_cycle = 0                 # of the others keep every n-th cycle at full rate; 0 keeps none
 
-# whom to tell, after a run, at 0 V
+# notifications, sent after a run, at 0 V
 # [notify]
 # command = ["python", "tell.py"]             # a program, which gets JSON on its standard input
 # webhook = "env:LAB_WEBHOOK"                 # an address, or a variable that has it
@@ -173,7 +173,7 @@ class _File(Table):
     warm_up: _WarmUp = Field(default=_WarmUp(runs=0), description="runs before the others")
     after: _After = Field(default=_After(), description="what is computed after each run")
     keep: _Keep = Field(default=_Keep(), description="which recordings are kept whole")
-    notify: NotifyTable = Field(default=NotifyTable(), description="whom to tell")
+    notify: NotifyTable = Field(default=NotifyTable(), description="notifications")
 
 
 _COMPARISONS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
@@ -222,7 +222,7 @@ class Campaign:
     fitted. ``model`` is the file of the first model of ``validate``, None for none. Of
     ``keep_every`` runs one recording is kept whole, and of the others one of ``keep_cycles``
     cycles, 0 for none. ``sequences`` has the TOML of each sequence by its name in the plan.
-    ``notify`` says whom to tell when a run ends.
+    ``notify`` are the settings of notifications.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Whom to tell when a run ends: the keys of ``[notify]`` in a plan, and what they may be."""
+"""Settings of notifications: the keys of ``[notify]`` in a plan, and their allowed values."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ class NotifyTable(Table):
     webhook: str = Field(
         default="", description="an address that takes JSON, or env:NAME for a variable with one"
     )
-    on: list[Event] = Field(default_factory=lambda: list(EVENTS), description="what is told")
+    on: list[Event] = Field(default_factory=lambda: list(EVENTS), description="events to report")
 
     def settings(self) -> Notify:
-        """Return what the table says."""
+        """Return the settings of the table."""
         return Notify(tuple(self.command), self.webhook, tuple(self.on))
 
 
 @dataclass(frozen=True)
 class Notify:
-    """Whom to tell of the events ``on``: a ``command``, a ``webhook``, both or nobody.
+    """Settings of notifications of the events ``on``: by ``command``, ``webhook``, both or neither.
 
     ``command`` is a program with its arguments, () for none. ``webhook`` is an address, which may
     be a secret, or ``env:NAME``; "" for none.

@@ -102,7 +102,7 @@ class Guard:
     def _is_own(self, host: str) -> bool:
         """Return True if ``host``, with or without a port, names this page.
 
-        An address can be named by everybody: only a name can be pointed at somebody else.
+        A shared page answers to any numeric address too: DNS rebinding needs a name.
         """
         try:
             name = urlsplit(f"//{host}").hostname or ""
