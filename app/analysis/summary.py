@@ -302,7 +302,7 @@ def assess(
     try:
         chosen, of_these = _model(model, recording)
         fitted = bool(of_these) and recording.sha256 in of_these
-        errors = compare(recording, chosen, "validation", drive).errors
+        errors = compare(recording, chosen, "validation", drive, hashed=False).errors
     except DearigError as error:
         unfit = str(error)
     progress(recording.name, 1.0)
@@ -324,7 +324,7 @@ def curves(
     errors, unfit = None, ""
     try:
         chosen, _ = _model(model, recording)
-        compared = compare(recording, chosen, "validation", drive)
+        compared = compare(recording, chosen, "validation", drive, hashed=False)
         drawn = _short(time, compared.model, _COLUMNS)
         residual = _short(time, compared.measured - compared.model, _COLUMNS)
         errors = compared.errors
@@ -382,7 +382,7 @@ def spectra(
     residual = None
     try:
         chosen, _ = _model(model, recording)
-        compared = compare(recording, chosen, "validation", drive)
+        compared = compare(recording, chosen, "validation", drive, hashed=False)
         residual = amplitude_density(compared.measured - compared.model, recording.rate)
     except DearigError:
         residual = None  # the curves say why

@@ -22,6 +22,7 @@ from dearig.analysis.summary import (
     numbers,
     read_entries,
     recover_file,
+    spectra,
     summary_of,
 )
 from dearig.config.modelfile import save_model
@@ -173,6 +174,15 @@ def test_long_curves_keep_their_peaks(folder, monkeypatch):
     recording, found = open_recording(folder / "high.h5"), curves(folder / "high.h5", None)
     assert found.measured[0].size <= 42
     assert found.measured[1].max() == recording.displacement.max()
+
+
+def test_no_file_is_hashed_to_draw_its_curves(folder, monkeypatch):
+    hashed: list[Path] = []
+    monkeypatch.setattr("dearig.recording.recording.file_sha256", lambda p: hashed.append(p) or "")
+    assert curves(folder / "high.h5", None).model is not None
+    assert spectra(folder / "high.h5", None).residual is not None
+    assert assess(folder / "high.h5", None).errors is not None
+    assert hashed == []
 
 
 def test_differences_are_those_of_conditions_not_of_results(folder):
