@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from typing import Literal
 
@@ -29,8 +28,9 @@ from dearig.drivers.vaisala import VaisalaDriver
 from dearig.model.material import Film
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import FaultKind, FaultPlan
-from dearig.sim_backend.keyence import SimulatedController, SimulatedLine
-from dearig.sim_backend.room import Air, SimulatedSource, local_seconds, time_in_room
+from dearig.sim_backend.keyence import SimulatedController
+from dearig.sim_backend.room import SimulatedSource, air_of_run
+from dearig.sim_backend.serial_line import SimulatedLine
 
 __all__ = ["KIND", "SimulatedKind"]
 
@@ -132,8 +132,7 @@ def _simulated_room(
     sensor = settings.thermohygrometer
     if sensor is None or not isinstance(room_driver(sensor.driver), VaisalaDriver):
         return settings, None
-    air = Air(settings.room, time_in_room(settings.room, 0, lambda: local_seconds(time.time)))
-    source = SimulatedSource(sensor, air, faults=faults)
+    source = SimulatedSource(sensor, air_of_run(settings.room, 0), faults=faults)
     shown = sensor.model_copy(update={"port": source.port})
     return settings.model_copy(update={"thermohygrometer": shown}), source.driver
 

@@ -20,7 +20,7 @@ from dearig.sim_backend.clock import Clock
 from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
 from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.plant import Plant
-from dearig.sim_backend.room import Air, local_seconds, time_in_room
+from dearig.sim_backend.room import air_of_run
 from dearig.sim_backend.signal_path import CHUNK, PathState, SignalPath
 from dearig.sim_backend.streams import Streams
 
@@ -221,7 +221,7 @@ class SimulatedRig:
                 self._faults,
                 self._noise,
                 waveform.block or CHUNK,
-                Air(self._settings.room, self._time_in_room()),
+                air_of_run(self._settings.room, self._streams.seed[0] + self._runs),
             )
             command = Command(waveform, self._card.channels[0].scaling)
             self._run = _Run(command, path, path.start(self._plant))
@@ -229,11 +229,6 @@ class SimulatedRig:
             self._rate = rate
             self._state = RigState.LOADED
             return rate
-
-    def _time_in_room(self) -> float:
-        """Return the time in s in the room at which the next run starts."""
-        run = self._streams.seed[0] + self._runs
-        return time_in_room(self._settings.room, run, lambda: local_seconds(time.time))
 
     def arm(self) -> None:
         """Prepare for a start without delay; the output stays at 0 V."""

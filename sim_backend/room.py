@@ -20,10 +20,10 @@ from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
 from dearig.drivers.thermohygrometer import NO_READING, RoomReading, ThermohygrometerError
 from dearig.drivers.vaisala import VaisalaDriver
 from dearig.sim_backend.faults import FaultKind, FaultPlan
-from dearig.sim_backend.keyence import SimulatedLine
+from dearig.sim_backend.serial_line import SimulatedLine
 from dearig.sim_backend.vaisala import SimulatedProbe
 
-__all__ = ["Air", "SimulatedSource", "local_seconds", "still_air", "time_in_room"]
+__all__ = ["Air", "SimulatedSource", "air_of_run", "still_air", "time_in_room"]
 
 _HOUR = 3600.0  # s
 _DAY = 24.0 * _HOUR
@@ -41,12 +41,6 @@ def time_in_room(settings: RoomSettings, run: int, computer: Callable[[], float]
     if settings.clock == "computer":
         return computer()
     return (settings.start_h + settings.hours_per_run * run) * _HOUR
-
-
-def local_seconds(computer: Callable[[], float]) -> float:
-    """Return the s since a midnight of local time, by a clock of Unix time."""
-    now = computer()
-    return now + time.localtime(now).tm_gmtoff
 
 
 @dataclass(frozen=True)
@@ -94,6 +88,17 @@ class Air:
                 turned = 2.0 * math.pi * (now / period + generator.random())
                 changes += weather * math.sqrt(2.0 / _WEATHERS) * np.sin(turned)
         return np.asarray(changes)
+
+
+def air_of_run(settings: RoomSettings, run: int) -> Air:
+    """Return the air of run number ``run`` of a simulated rig that starts now."""
+    return Air(settings, time_in_room(settings, run, _local_seconds))
+
+
+def _local_seconds() -> float:
+    """Return the s since a midnight of local time."""
+    now = time.time()
+    return now + time.localtime(now).tm_gmtoff
 
 
 def still_air(temperature: float, humidity: float) -> Air:

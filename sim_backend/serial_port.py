@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from dearig.sim_backend.clock import Clock, PacedClock
-from dearig.sim_backend.keyence import Responder
+from dearig.sim_backend.serial_line import Responder
 
 __all__ = ["serve_on_pty", "serve_on_socket"]
 

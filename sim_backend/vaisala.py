@@ -23,7 +23,7 @@ _MAGNUS_A, _MAGNUS_B = 17.62, 243.12
 
 
 class SimulatedProbe:
-    """Probe with ``settings``; see ``dearig.sim_backend.keyence.Responder``.
+    """Probe with ``settings``; see ``dearig.sim_backend.serial_line.Responder``.
 
     ``measured`` returns degrees Celsius and per cent, or NaN for a value that the probe cannot
     measure. While ``garbled`` returns True, bytes of its answers are noise. With ``echo`` it sends

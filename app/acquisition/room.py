@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.config.rigfile import RigFile
@@ -16,7 +15,7 @@ from dearig.drivers.settings import ThermohygrometerSettings
 from dearig.drivers.thermohygrometer import RoomLimits, RoomReading, RoomSource
 from dearig.errors import InstrumentFault, SafetyStop
 from dearig.sim_backend.faults import FaultPlan
-from dearig.sim_backend.room import Air, SimulatedSource, local_seconds, time_in_room
+from dearig.sim_backend.room import SimulatedSource, air_of_run
 
 __all__ = ["RoomOfRun", "open_room"]
 
@@ -35,9 +34,7 @@ def open_room(
     if settings is None:
         return RoomOfRun(None, None)
     if is_simulated(address):
-        air = Air(
-            rig_file.room, time_in_room(rig_file.room, seed, lambda: local_seconds(time.time))
-        )
+        air = air_of_run(rig_file.room, seed)
         try:
             return RoomOfRun(SimulatedSource(settings, air, (seed,), faults), settings)
         except RigError as error:

@@ -23,10 +23,10 @@ from dearig.drivers.keyence.commands import (
     Command,
 )
 from dearig.drivers.keyence.compare import ControllerSettings
-from dearig.drivers.serial_line import POLL, Port, PortError, open_serial_port
+from dearig.drivers.serial_line import Port, PortError, open_serial_port
 from dearig.drivers.settings import LaserSettings
 
-__all__ = ["POLL", "Keyence", "LaserError", "NoReading", "Port", "open_port"]
+__all__ = ["Keyence", "LaserError", "NoReading", "Port", "open_port"]
 
 _ATTEMPTS = 3
 _PATIENCE = 1.0  # s; after a longer silence a command is not repeated

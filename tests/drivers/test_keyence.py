@@ -23,10 +23,11 @@ from dearig.drivers.keyence import (
     open_port,
 )
 from dearig.drivers.keyence.commands import AVERAGING, COMMANDS, ERRORS, SAMPLING_US
-from dearig.drivers.keyence.controller import POLL
+from dearig.drivers.serial_line import POLL
 from dearig.drivers.settings import LaserSettings
 from dearig.sim_backend.faults import FaultPlan
-from dearig.sim_backend.keyence import Behaviour, SimulatedController, SimulatedLine
+from dearig.sim_backend.keyence import Behaviour, SimulatedController
+from dearig.sim_backend.serial_line import SimulatedLine
 from dearig.sim_backend.serial_port import serve_on_pty, serve_on_socket
 
 SETTINGS = LaserSettings(port="COM3")

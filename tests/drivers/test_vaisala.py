@@ -11,7 +11,7 @@ from dearig.drivers.serial_line import POLL
 from dearig.drivers.settings import ThermohygrometerSettings
 from dearig.drivers.thermohygrometer import ThermohygrometerDriver, ThermohygrometerError
 from dearig.drivers.vaisala import TIMEOUT, VaisalaDriver, VaisalaProbe
-from dearig.sim_backend.keyence import SimulatedLine
+from dearig.sim_backend.serial_line import SimulatedLine
 from dearig.sim_backend.serial_port import serve_on_socket
 from dearig.sim_backend.vaisala import SimulatedProbe
 
