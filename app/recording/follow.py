@@ -112,7 +112,7 @@ class Follower:
             expected=int(counts.data.attrs.get("samples_expected", 0)),
             simulated=about is not None and bool(about.attrs.get("simulated", False)),
             described={
-                name: (UNITS.get(name, ""), "") if name in UNITS else counts.described(name)
+                name: (UNITS[name], "") if name in UNITS else counts.described(name)
                 for name in values
             },
             identifier=identifier_of(entry),
