@@ -10,8 +10,9 @@ from PySide6.QtWidgets import QWidget
 from dearig.window.dialogs import ask
 from dearig.window.document import Asked, TextFile
 from dearig.window.session import Session
+from dearig.window.widgets import Message
 
-__all__ = ["ask_replace", "may_close", "may_drop", "offer_unsaved"]
+__all__ = ["may_close", "may_drop", "offer_unsaved", "replace_or_tell"]
 
 
 def may_drop(parent: QWidget, session: Session, file: TextFile, text: str) -> bool:
@@ -39,9 +40,14 @@ def may_close(parent: QWidget, session: Session) -> bool:
     )
 
 
-def ask_replace(parent: QWidget, session: Session, asked: Asked) -> bool:
-    """Return True if a file that another program has changed may be replaced."""
-    return ask(
+def replace_or_tell(
+    parent: QWidget, session: Session, asked: Asked, save: Callable[..., None], trouble: Message
+) -> None:
+    """Ask whether a file that another program has changed may be replaced.
+
+    Calls ``save(path, replace=True)`` if so; else ``trouble`` says that nothing was written.
+    """
+    agreed = ask(
         parent,
         session,
         "Changed by another program",
@@ -50,6 +56,10 @@ def ask_replace(parent: QWidget, session: Session, asked: Asked) -> bool:
         "Replace the file",
         "Cancel",
     )
+    if agreed:
+        save(asked.path, replace=True)
+    else:
+        trouble.show_text(f"{asked.sentence}; nothing was written")
 
 
 def offer_unsaved(

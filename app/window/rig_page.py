@@ -38,7 +38,7 @@ from dearig.window.dialogs import choose_file, save_as
 from dearig.window.document import Asked, Saved, TextFile
 from dearig.window.fields import form_fields, in_words
 from dearig.window.form import Form
-from dearig.window.questions import ask_replace, may_drop
+from dearig.window.questions import may_drop, replace_or_tell
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.widgets import Message, button, card, label, plain_tip, set_wrong
@@ -208,10 +208,7 @@ class RigPage(QWidget):
     def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
         self.trouble.show_text("")
         if isinstance(answer, Asked):
-            if ask_replace(self, self.session, answer):
-                self.save_file(answer.path, replace=True)
-            else:
-                self.trouble.show_text(f"{answer.sentence}; nothing was written")
+            replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
         elif isinstance(answer, Saved):
             answer.file.note(answer)
             self._take(self.text, self.file)  # the path may be another one

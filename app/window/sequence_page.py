@@ -18,7 +18,7 @@ from dearig.window.draft import Draft, relative_csv
 from dearig.window.fields import in_words
 from dearig.window.layout_state import remember
 from dearig.window.preview_panel import PreviewPanel
-from dearig.window.questions import ask_replace, may_drop
+from dearig.window.questions import may_drop, replace_or_tell
 from dearig.window.sequence_editor import SequenceEditor
 from dearig.window.session import Preview, Session
 from dearig.window.theme import SPACE
@@ -139,10 +139,7 @@ class SequencePage(QWidget):
     @Slot(object)
     def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
         if isinstance(answer, Asked):
-            if ask_replace(self, self.session, answer):
-                self.save_file(answer.path, replace=True)
-            else:
-                self.trouble.show_text(f"{answer.sentence}; nothing was written")
+            replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
             return
         if isinstance(answer, Saved):
             path = answer.path

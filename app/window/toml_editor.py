@@ -13,7 +13,7 @@ from dearig.config.toml_input import read_text
 from dearig.window.background import Background
 from dearig.window.dialogs import choose_file, save_as
 from dearig.window.document import Asked, Saved, TextFile
-from dearig.window.questions import ask_replace, may_drop
+from dearig.window.questions import may_drop, replace_or_tell
 from dearig.window.session import Session
 from dearig.window.widgets import Message, button, label
 
@@ -119,8 +119,7 @@ class TomlEditor(QWidget):
     def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
         self.trouble.show_text("")
         if isinstance(answer, Asked):
-            if ask_replace(self, self.session, answer):
-                self.save_file(answer.path, replace=True)
+            replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
         elif isinstance(answer, Saved):
             answer.file.note(answer)
             self._edited()

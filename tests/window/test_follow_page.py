@@ -217,6 +217,10 @@ def test_a_target_is_read_written_and_asked_for(
     page.target.open_file(path)  # the answer is no
     assert "target path.toml (changed: segment 2 duration (s))" in answers.questions[0]
     assert page.target.toml == FAST
+    path.write_text(f"{UP_AND_DOWN}# by another program\n", encoding="utf-8")
+    page.target.save_file(path)
+    qtbot.waitUntil(lambda: "nothing was written" in page.target.trouble.text(), timeout=_PATIENCE)
+    assert path.read_text(encoding="utf-8").endswith("# by another program\n")
     answers.next = True
     table = tmp_path / "table.csv"
     table.write_text("time_s,displacement_um\n0,0\n1,200\n2,40\n8,0\n", encoding="utf-8")
