@@ -21,7 +21,7 @@ from dearig.errors import DearigError, InstrumentFault, NotSafe, SafetyStop
 from dearig.output_state import Known, OutputState
 from dearig.window.campaign_compute import ComputeApart
 from dearig.window.live import Live
-from dearig.window.running import ENDS, PROGRAM_FAULT, Play, PlayThread, RunEnd
+from dearig.window.running import PROGRAM_FAULT, Play, PlayThread, RunEnd, headline_of
 
 __all__ = ["CampaignRequest", "CampaignThread"]
 
@@ -119,7 +119,7 @@ class CampaignThread(PlayThread):
 
     def _early_end(self, error: DearigError, outcome: CampaignOutcome | None) -> RunEnd:
         """Describe a campaign that ``error`` ended, before it began without an ``outcome``."""
-        headline = next((words for kind, words in ENDS.items() if isinstance(error, kind)), "Ended")
+        headline = headline_of(error)
         sentence = str(error)
         if outcome is not None:
             headline = _HEADLINES.get(outcome.status, headline)

@@ -38,13 +38,13 @@ from dearig.window.live import Live
 from dearig.window.session import Session
 
 __all__ = [
-    "ENDS",
     "PROGRAM_FAULT",
     "Play",
     "PlayThread",
     "RunEnd",
     "RunRequest",
     "Runner",
+    "headline_of",
     "next_recording_path",
 ]
 
@@ -53,13 +53,18 @@ PROGRAM_FAULT = (
     "details of the error"
 )
 _ALARM_MAX = 1000  # characters of an alarm; the settings keep it
-ENDS: dict[type[DearigError], str] = {
+_ENDS: dict[type[DearigError], str] = {
     Interrupted: "Stopped",
     SafetyStop: "Stopped by an interlock",
     InstrumentFault: "Instrument fault",
     DiskFault: "Disk fault",
     InputError: "Refused",
 }
+
+
+def headline_of(error: DearigError) -> str:
+    """Return the headline of what ``error`` ended."""
+    return next((words for kind, words in _ENDS.items() if isinstance(error, kind)), "Ended")
 
 
 class Play(Enum):
@@ -335,7 +340,7 @@ class _RunThread(PlayThread):
 
 def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
     """Describe a run that ended early; ``played`` is True where its rig was ready to start."""
-    headline = next((words for kind, words in ENDS.items() if isinstance(error, kind)), "Ended")
+    headline = headline_of(error)
     sentence = str(error).removeprefix("interrupted: ")
     output = error.output_state
     fault = played and isinstance(error, SafetyStop | InstrumentFault)
