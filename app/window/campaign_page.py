@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import Qt, QTimer, QUrl, Signal, Slot
-from PySide6.QtGui import QDesktopServices, QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.acquisition.run import RunOptions
@@ -26,6 +26,7 @@ from dearig.report.campaign_page import duration_text, write_campaign_report
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window import dialogs
 from dearig.window.background import Background
+from dearig.window.browser import open_in_browser
 from dearig.window.campaign_controls import CampaignControls
 from dearig.window.campaign_plan import (
     OpenedCampaign,
@@ -43,6 +44,7 @@ from dearig.window.document import TextFile
 from dearig.window.hv import HighVoltage
 from dearig.window.hv_status import Reading
 from dearig.window.layout_state import remember
+from dearig.window.page_parts import result_side, splitter
 from dearig.window.running import Play, RunEnd, Runner
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
@@ -94,11 +96,9 @@ class CampaignPage(QWidget):
         self._opening.done.connect(self._opened)
         self._opening.failed.connect(self._fail)
 
-        self.split = QSplitter(Qt.Orientation.Horizontal)
-        self.split.addWidget(self._make_plan())
-        self.split.addWidget(self._make_runs())
-        self.split.setStretchFactor(1, 1)
-        self.split.setChildrenCollapsible(False)
+        self.split = splitter(
+            Qt.Orientation.Horizontal, self._make_plan(), self._make_runs(), growing=1
+        )
         self.reset_layout()
         remember(self.split, session.settings, "campaign/columns")
         outer = QVBoxLayout(self)
@@ -161,9 +161,6 @@ class CampaignPage(QWidget):
             thread.deleteLater()
             return
         self._thread, self._folder = thread, folder
-        self._sizes = dict(
-            zip((run.name for run in found.campaign.runs), found.forecast.sizes, strict=True)
-        )
         self.message.show_text("")
         self._runner.status.set_between(_PLANNED)
         session.block(_BLOCK, "a campaign goes on: see the page Campaign")
@@ -204,8 +201,8 @@ class CampaignPage(QWidget):
     # plan
 
     @Slot()
-    def _plan_changed(self) -> None:
-        """Survey the runs again; what was armed is not what they are now."""
+    def _survey_again(self) -> None:
+        """Disarm, and survey the runs again: plan, rig or film have changed."""
         self._disarm()
         self._survey = None
         if self.isVisible():
@@ -404,14 +401,6 @@ class CampaignPage(QWidget):
         self._refresh()
 
     @Slot()
-    def _rig_changed(self) -> None:
-        self._disarm()
-        self._survey = None
-        if self.isVisible():
-            self._ask_survey(soon=True)
-        self._refresh()
-
-    @Slot()
     def _play_next(self) -> None:
         names = [row.name for row in self.table.chosen if row.state == WAITING]
         # the last one that is put first is played first
@@ -461,8 +450,7 @@ class CampaignPage(QWidget):
 
     @Slot(object)
     def _report_written(self, path: Path) -> None:
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
-            self.message.show_text(f"No browser was found. Open {path} in one.", "warn")
+        open_in_browser(path, self.message)
 
     @Slot(str)
     def _show_recording(self, name: str) -> None:
@@ -485,7 +473,7 @@ class CampaignPage(QWidget):
         if self.controls.operator.text() != session.operator:
             self.controls.operator.setText(session.operator)
         if survey is not None and survey.request.film != session.film:
-            self._rig_changed()  # the limits hold for one film
+            self._survey_again()  # the limits hold for one film
 
     # state
 
@@ -536,7 +524,7 @@ class CampaignPage(QWidget):
 
     def _connect(self) -> None:
         session, controls = self._session, self.controls
-        self.plan.changed.connect(self._plan_changed)
+        self.plan.changed.connect(self._survey_again)
         self.table.chosen_changed.connect(self._refresh)
         self.table.opened.connect(self._show_recording)
         controls.changed.connect(self._batch_changed)
@@ -551,7 +539,7 @@ class CampaignPage(QWidget):
         controls.skip.clicked.connect(self._leave_out)
         self._runner.state_changed.connect(self._refresh)
         self._runner.ended.connect(self._ended)
-        session.rig_changed.connect(self._rig_changed)
+        session.rig_changed.connect(self._survey_again)
         session.notes_changed.connect(self._notes_changed)
         session.running_changed.connect(self._refresh)
         session.blocks_changed.connect(self._refresh)
@@ -566,7 +554,6 @@ class CampaignPage(QWidget):
 
     def _make_runs(self) -> QWidget:
         self.headline = label("No runs yet", "title")
-        self.headline.setWordWrap(True)
         self.new_button = button(
             "&New", "Begin a new campaign with this plan; the present one stays"
         )
@@ -577,23 +564,14 @@ class CampaignPage(QWidget):
         self.open_button.clicked.connect(self._ask_open)
         self.report_button = button("Open re&port", "Write the report and open it in the browser")
         self.report_button.clicked.connect(self._report)
-        top = QHBoxLayout()
-        top.addWidget(self.headline, 1)
-        for made in (self.open_button, self.new_button, self.report_button):
-            top.addWidget(made, 0, Qt.AlignmentFlag.AlignTop)
         self.summary = Message()
         self.message = Message()
         self.table = CampaignTable(self._session)
         self.controls = CampaignControls()
-        side = QWidget()
-        outer = QVBoxLayout(side)
-        outer.setContentsMargins(SPACE, 0, 0, 0)
-        outer.addLayout(top)
-        outer.addWidget(self.summary)
-        outer.addWidget(self.message)
-        outer.addWidget(self.table, 1)
-        outer.addWidget(self.controls)
-        return side
+        return result_side(
+            self.headline, (self.open_button, self.new_button, self.report_button),
+            (self.summary, self.message), self.table, self.controls,
+        )  # fmt: skip
 
 
 def _write_report(folder: Path, progress: Progress = quiet) -> Path:

@@ -10,16 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import Qt, QUrl, Signal, Slot
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
     QDoubleSpinBox,
     QFormLayout,
-    QHBoxLayout,
-    QProgressBar,
-    QSplitter,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -36,6 +32,7 @@ from dearig.report.track_page import (
     track_headline,
 )
 from dearig.units import readable
+from dearig.window.browser import open_in_browser
 from dearig.window.follow_jobs import (
     Followed,
     FollowRequest,
@@ -49,6 +46,7 @@ from dearig.window.follow_plots import ErrorPlot, FollowPlots
 from dearig.window.follow_target import TargetEditor
 from dearig.window.hold_panel import HoldPanel
 from dearig.window.layout_state import remember
+from dearig.window.page_parts import JobControls, result_side, splitter
 from dearig.window.report_page import ReportPage
 from dearig.window.report_table import ReportTable
 from dearig.window.session import Session
@@ -88,11 +86,9 @@ class FollowPage(QWidget):
         self._awaited = ""  # TOML of the sequence that was shown on the page Run
         self._recorded_meanwhile: Path | None = None  # while a job went on
 
-        self.split = QSplitter(Qt.Orientation.Horizontal)
-        self.split.addWidget(self._make_inputs())
-        self.split.addWidget(self._make_results())
-        self.split.setStretchFactor(1, 1)
-        self.split.setChildrenCollapsible(False)
+        self.split = splitter(
+            Qt.Orientation.Horizontal, self._make_inputs(), self._make_results(), growing=1
+        )
         self.hold = HoldPanel(session, self._worker)
         self.hold.use_model.connect(self.use_model)
         self.hold.waits.connect(self.waits)
@@ -191,25 +187,17 @@ class FollowPage(QWidget):
     def _submit(self, job: Job, done: Callable[[Any], None]) -> None:
         self._job = job
         self.message.show_text("")
-        job.progressed.connect(self._progressed)
         job.finished.connect(done)
         job.finished.connect(self._job_ended)
         job.failed.connect(self._failed)
         job.cancelled.connect(self._cancelled)
-        self.stage.setText("Starting")
-        self.bar.setRange(0, 0)
+        self.job.begin(job)
         self._refresh()
-
-    @Slot(str, float, float)
-    def _progressed(self, stage: str, fraction: float, left: float) -> None:  # noqa: ARG002
-        if self._job is not None and not self._job.asked_to_stop:
-            self.stage.setText(f"{stage[:1].upper()}{stage[1:]}")
 
     @Slot()
     def _job_ended(self) -> None:
         self._job = None
-        self.stage.setText(" ")
-        self.bar.setRange(0, 1)
+        self.job.end()
         path, self._recorded_meanwhile = self._recorded_meanwhile, None
         if path is not None:
             self._recorded(path)
@@ -231,8 +219,7 @@ class FollowPage(QWidget):
 
     @Slot(object)
     def _report_written(self, path: Path) -> None:
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
-            self.message.show_text(f"No browser was found. Open {path} in one.", "warn")
+        open_in_browser(path, self.message)
 
     @Slot(str)
     def _failed(self, sentence: str) -> None:
@@ -243,12 +230,6 @@ class FollowPage(QWidget):
     def _cancelled(self) -> None:
         self._job_ended()
         self.message.show_text("Cancelled; nothing has changed.", "warn")
-
-    @Slot()
-    def _cancel(self) -> None:
-        if self._job is not None:
-            self.stage.setText("Ending; click Cancel again to end at once")
-            self._job.cancel()
 
     # runs
 
@@ -356,7 +337,6 @@ class FollowPage(QWidget):
             self.nearest.isChecked() or followed.tracking.outcome("").feasible
         )
         self.compute_button.setEnabled(free)
-        self.cancel_button.setEnabled(self._job is not None)
         self.run_button.setEnabled(free and playable and reachable)
         self.again_button.setEnabled(free and self._best() is not None)
         self.report_button.setEnabled(
@@ -408,23 +388,12 @@ class FollowPage(QWidget):
             "&Compute the voltage", "Compute the voltage of the first run; nothing is played", True
         )
         self.compute_button.clicked.connect(self.compute)
-        self.cancel_button = button("Cance&l", "End the computation; a second click ends at once")
-        self.cancel_button.clicked.connect(self._cancel)
-        self.bar = QProgressBar()
-        self.bar.setTextVisible(False)
-        self.bar.setFixedHeight(8)
-        self.bar.setRange(0, 1)
-        self.stage = label(" ", "muted")
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.compute_button, 2)
-        buttons.addWidget(self.cancel_button, 1)
+        self.job = JobControls(self.compute_button, "Cance&l")
         inner = QVBoxLayout()
         inner.addWidget(self.target, 1)
         inner.addLayout(form)
         inner.addWidget(self.nearest)
-        inner.addLayout(buttons)
-        inner.addWidget(self.bar)
-        inner.addWidget(self.stage)
+        inner.addWidget(self.job)
         frame = card(inner)
         frame.setMinimumWidth(280)
         return frame
@@ -432,7 +401,6 @@ class FollowPage(QWidget):
     def _make_results(self) -> QWidget:
         session = self._session
         self.headline = label("No voltage yet", "title")
-        self.headline.setWordWrap(True)
         self.run_button = button(
             "Show on R&un", "Show the next run on the page Run, to arm and start it there", True
         )
@@ -444,10 +412,6 @@ class FollowPage(QWidget):
         self.again_button.clicked.connect(self.play_best)
         self.report_button = button("Open re&port", "Write the report and open it in the browser")
         self.report_button.clicked.connect(self.open_report)
-        top = QHBoxLayout()
-        top.addWidget(self.headline, 1)
-        for made in (self.report_button, self.again_button, self.run_button):
-            top.addWidget(made, 0, Qt.AlignmentFlag.AlignTop)
         self.state = Message()
         self.message = Message()
         self.plots = FollowPlots(session)
@@ -462,23 +426,12 @@ class FollowPage(QWidget):
         self.tabs.addTab(self.runs, "Runs")
         self.errors = ErrorPlot(session)
         self.errors.hide()  # until there is a run
-        self.columns = QSplitter(Qt.Orientation.Horizontal)
-        self.columns.addWidget(self.tabs)
-        self.columns.addWidget(self.errors)
-        self.columns.setChildrenCollapsible(False)
-        self.rows = QSplitter(Qt.Orientation.Vertical)
-        self.rows.addWidget(self.plots)
-        self.rows.addWidget(self.columns)
-        self.rows.setStretchFactor(0, 1)
-        self.rows.setChildrenCollapsible(False)
-        side = QWidget()
-        outer = QVBoxLayout(side)
-        outer.setContentsMargins(SPACE, 0, 0, 0)
-        outer.addLayout(top)
-        outer.addWidget(self.state)
-        outer.addWidget(self.message)
-        outer.addWidget(self.rows, 1)
-        return side
+        self.columns = splitter(Qt.Orientation.Horizontal, self.tabs, self.errors)
+        self.rows = splitter(Qt.Orientation.Vertical, self.plots, self.columns, growing=0)
+        return result_side(
+            self.headline, (self.report_button, self.again_button, self.run_button),
+            (self.state, self.message), self.rows,
+        )  # fmt: skip
 
 
 #: Text of the page before the first voltage.

@@ -8,15 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import Qt, QTimer, QUrl, Signal, Slot
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt, QTimer, Signal, Slot
 from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
-    QProgressBar,
-    QSplitter,
     QVBoxLayout,
     QWidget,
 )
@@ -27,6 +24,7 @@ from dearig.report.numbers import seconds, significant
 from dearig.report.tables import Table
 from dearig.report.track_page import limits_table
 from dearig.units import readable
+from dearig.window.browser import open_in_browser
 from dearig.window.follow_model import ModelChoice
 from dearig.window.hold_jobs import (
     HoldForecast,
@@ -38,6 +36,7 @@ from dearig.window.hold_jobs import (
 )
 from dearig.window.layout_state import remember
 from dearig.window.live import Live
+from dearig.window.page_parts import JobControls, result_side, splitter
 from dearig.window.plot_area import PlotArea
 from dearig.window.report_page import ReportPage
 from dearig.window.running import Play, RunEnd
@@ -86,11 +85,9 @@ class HoldPanel(QWidget):
         self._outcome: HoldOutcome | None = None
         self._live: Live | None = None  # of a run of the forecast
         self._running = False
-        self.split = QSplitter(Qt.Orientation.Horizontal)
-        self.split.addWidget(self._make_inputs())
-        self.split.addWidget(self._make_results())
-        self.split.setStretchFactor(1, 1)
-        self.split.setChildrenCollapsible(False)
+        self.split = splitter(
+            Qt.Orientation.Horizontal, self._make_inputs(), self._make_results(), growing=1
+        )
         self.reset_layout()
         remember(self.split, session.settings, "hold/columns")
         remember(self.rows, session.settings, "hold/rows")
@@ -136,7 +133,7 @@ class HoldPanel(QWidget):
     def check(self) -> None:
         """Say whether the displacement can be held; nothing is played."""
         if self._job is None:
-            self._submit(self.worker.submit(forecast_hold, self.request()), self._foreseen)
+            self._submit(self.worker.submit(forecast_hold, self.request()), self._planned)
 
     @Slot()
     def show_on_run(self) -> None:
@@ -202,24 +199,17 @@ class HoldPanel(QWidget):
         self._job = job
         if not keep_message:
             self.message.show_text("")
-        job.progressed.connect(self._progressed)
         job.finished.connect(done)
         job.finished.connect(self._job_ended)
         job.failed.connect(self._failed)
         job.cancelled.connect(self._job_ended)
-        self.stage.setText("Starting")
-        self.bar.setRange(0, 0)
+        self.job.begin(job)
         self._refresh()
-
-    @Slot(str, float, float)
-    def _progressed(self, stage: str, fraction: float, left: float) -> None:  # noqa: ARG002
-        self.stage.setText(f"{stage[:1].upper()}{stage[1:]}")
 
     @Slot()
     def _job_ended(self) -> None:
         self._job = None
-        self.stage.setText(" ")
-        self.bar.setRange(0, 1)
+        self.job.end()
         self._refresh()
 
     @Slot(str)
@@ -229,14 +219,8 @@ class HoldPanel(QWidget):
         words = f"{sentence[:1].upper()}{sentence[1:]}."
         self.message.show_text(f"{before}\n{words}" if before else words)
 
-    @Slot()
-    def _cancel(self) -> None:
-        if self._job is not None:
-            self.stage.setText("Ending; click Cancel again to end at once")
-            self._job.cancel()
-
     @Slot(object)
-    def _foreseen(self, forecast: HoldForecast) -> None:
+    def _planned(self, forecast: HoldForecast) -> None:
         self._forecast, self._outcome, self._live = forecast, None, None
         numbers, feedback = forecast.numbers, forecast.plan.feedback
         self.headline.setText(
@@ -272,8 +256,7 @@ class HoldPanel(QWidget):
 
     @Slot(object)
     def _report_written(self, path: Path) -> None:
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
-            self.message.show_text(f"No browser was found. Open {path} in one.", "warn")
+        open_in_browser(path, self.message)
 
     # display
 
@@ -323,7 +306,6 @@ class HoldPanel(QWidget):
         elif not self._running and self._live is None:
             self.state.show_text("")
         self.check_button.setEnabled(free)
-        self.cancel_button.setEnabled(self._job is not None)
         self.run_button.setEnabled(free and forecast is not None and not changed)
         self.report_button.setEnabled(self._job is None and self._outcome is not None)
 
@@ -367,21 +349,10 @@ class HoldPanel(QWidget):
             "&Check the hold", "Say whether it can be held; nothing is played", True
         )
         self.check_button.clicked.connect(self.check)
-        self.cancel_button = button("Ca&ncel", "End the computation; a second click ends at once")
-        self.cancel_button.clicked.connect(self._cancel)
-        self.bar = QProgressBar()
-        self.bar.setTextVisible(False)
-        self.bar.setFixedHeight(8)
-        self.bar.setRange(0, 1)
-        self.stage = label(" ", "muted")
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.check_button, 2)
-        buttons.addWidget(self.cancel_button, 1)
+        self.job = JobControls(self.check_button, "Ca&ncel")
         inner = QVBoxLayout()
         inner.addLayout(form)
-        inner.addLayout(buttons)
-        inner.addWidget(self.bar)
-        inner.addWidget(self.stage)
+        inner.addWidget(self.job)
         inner.addStretch(1)
         frame = card(inner)
         frame.setMinimumWidth(280)
@@ -389,7 +360,6 @@ class HoldPanel(QWidget):
 
     def _make_results(self) -> QWidget:
         self.headline = label("No hold yet", "title")
-        self.headline.setWordWrap(True)
         self.run_button = button(
             "Show &on Run", "Show the hold on the page Run, to arm and start it there", True
         )
@@ -398,10 +368,6 @@ class HoldPanel(QWidget):
             "Open re&port", "Write the report beside the recording and open it in the browser"
         )
         self.report_button.clicked.connect(self.open_report)
-        top = QHBoxLayout()
-        top.addWidget(self.headline, 1)
-        for made in (self.report_button, self.run_button):
-            top.addWidget(made, 0, Qt.AlignmentFlag.AlignTop)
         self.state = Message()
         self.message = Message()
         self.area = PlotArea(self._session, "Hold")
@@ -413,19 +379,11 @@ class HoldPanel(QWidget):
         ]
         self.words = ReportPage()
         self.words.show_pieces(_INTRODUCTION)
-        self.rows = QSplitter(Qt.Orientation.Vertical)
-        self.rows.addWidget(self.area)
-        self.rows.addWidget(self.words)
-        self.rows.setStretchFactor(0, 1)
-        self.rows.setChildrenCollapsible(False)
-        side = QWidget()
-        outer = QVBoxLayout(side)
-        outer.setContentsMargins(SPACE, 0, 0, 0)
-        outer.addLayout(top)
-        outer.addWidget(self.state)
-        outer.addWidget(self.message)
-        outer.addWidget(self.rows, 1)
-        return side
+        self.rows = splitter(Qt.Orientation.Vertical, self.area, self.words, growing=0)
+        return result_side(
+            self.headline, (self.report_button, self.run_button), (self.state, self.message),
+            self.rows,
+        )  # fmt: skip
 
 
 #: Text of the panel before the first check.

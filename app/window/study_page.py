@@ -6,8 +6,8 @@ import math
 import shutil
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl, Signal, Slot
-from PySide6.QtGui import QAction, QDesktopServices
+from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QRadioButton,
     QSpinBox,
-    QSplitter,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -32,9 +31,11 @@ from dearig.report.study_file import StudyEntry, make_study, open_study, studies
 from dearig.report.study_view import StudyView, view_of
 from dearig.window.background import Background
 from dearig.window.before_after_plot import BeforeAfterPlot
+from dearig.window.browser import open_in_browser
 from dearig.window.dialogs import save_as
 from dearig.window.layout_state import remember
 from dearig.window.library import shared_library
+from dearig.window.page_parts import splitter
 from dearig.window.report_page import ReportPage
 from dearig.window.residual_plots import ResidualPlots
 from dearig.window.session import Session
@@ -84,11 +85,9 @@ class StudyPage(QWidget):
         self._opening.done.connect(self._reopened)
         self._opening.failed.connect(self._show_trouble)
 
-        self.split = QSplitter(Qt.Orientation.Horizontal)
-        self.split.addWidget(self._make_inputs())
-        self.split.addWidget(self._make_results())
-        self.split.setStretchFactor(1, 1)
-        self.split.setChildrenCollapsible(False)
+        self.split = splitter(
+            Qt.Orientation.Horizontal, self._make_inputs(), self._make_results(), growing=1
+        )
         self.reset_layout()
         remember(self.split, session.settings, "study/columns")
         outer = QVBoxLayout(self)
@@ -443,11 +442,8 @@ class StudyPage(QWidget):
 
     @Slot()
     def _open_report(self) -> None:
-        if self._shown is None:
-            return
-        report = self._shown.report
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(report))):
-            self.message.show_text(f"No browser was found. Open {report} in one.", "warn")
+        if self._shown is not None:
+            open_in_browser(self._shown.report, self.message)
 
     @Slot()
     def _run(self) -> None:

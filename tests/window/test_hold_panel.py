@@ -87,7 +87,7 @@ def test_a_hold_is_checked_armed_on_run_watched_and_measured(
         "dearig.window.hold_panel.write_hold_report", lambda outcome, **_: outcome.recording
     )
     monkeypatch.setattr(
-        "dearig.window.hold_panel.QDesktopServices.openUrl",
+        "dearig.window.browser.QDesktopServices.openUrl",
         lambda url: not opened.append(url.toLocalFile()),
     )
     click(qtbot, panel.report_button)
