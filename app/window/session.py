@@ -161,17 +161,17 @@ class Session(QObject):
 
         Any change of the sequence, the rig, the rig file or the film removes it.
         """
-        self._hold = hold, self._hold_holds_for()
+        self._hold = hold, self._hold_conditions()
         self.hold_changed.emit()
 
     @property
     def hold(self) -> HoldPlan | None:
         """The hold that the present sequence belongs to, None for a run without feedback."""
-        if self._hold is None or self._hold[1] != self._hold_holds_for():
+        if self._hold is None or self._hold[1] != self._hold_conditions():
             return None
         return self._hold[0]
 
-    def _hold_holds_for(self) -> tuple[object, ...]:
+    def _hold_conditions(self) -> tuple[object, ...]:
         return self.sequence_toml, self.address, self.rig_file, self.film
 
     def set_preview(self, preview: Preview) -> None:
