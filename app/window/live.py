@@ -91,7 +91,7 @@ class Live(RunObserver):
         self._wanted = (tuple(overlays), drive)
         self._run: _Run | None = None
         self._events: list[LiveEvent] = []
-        self._answers: list[tuple[float, HoldAnswer]] = []
+        self._answers: list[tuple[float, float, float]] = []  # time, error and correction
         self._answered, self._stride = 0, 1  # answers that came; every so many are kept
         self.last_answer: HoldAnswer | None = None  #: of a feedback
         self._room: tuple[float, RoomReading] | None = None
@@ -117,7 +117,7 @@ class Live(RunObserver):
         with self._lock:
             self.last_answer = answer
             if self._answered % self._stride == 0:
-                self._answers.append((time, answer))
+                self._answers.append((time, answer.error, answer.correction))
             self._answered += 1
             if len(self._answers) > _ANSWERS_MAX:
                 self._answers, self._stride = self._answers[::2], 2 * self._stride
@@ -131,7 +131,7 @@ class Live(RunObserver):
     def answers(self) -> np.ndarray:
         """Return the answers of a feedback, (n, 3): time in s, error in m, and correction."""
         with self._lock:
-            rows = [(time, answer.error, answer.correction) for time, answer in self._answers]
+            rows = self._answers.copy()
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
     def follow(self, overlays: Sequence[OverlayModel], drive: str) -> None:
