@@ -6,10 +6,10 @@ reading and its age; a value that is too old is never handed on as a present one
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 from dearig.drivers.settings import ThermohygrometerSettings
 from dearig.drivers.thermohygrometer import (
@@ -18,6 +18,7 @@ from dearig.drivers.thermohygrometer import (
     Thermohygrometer,
     ThermohygrometerDriver,
     ThermohygrometerError,
+    aged,
 )
 
 __all__ = ["RoomWatch"]
@@ -41,7 +42,7 @@ class RoomWatch:
         self._clock = clock
         self._sensor: Thermohygrometer | None = None
         # the newest reading, when it was taken, and why there is no newer one
-        self._newest: tuple[RoomReading, float, str] = (NO_READING, clock(), "")
+        self._newest: tuple[RoomReading, float, str] = (NO_READING, -math.inf, "")
         self._end = threading.Event()
         self._thread: threading.Thread | None = None
         self.poll()
@@ -65,10 +66,7 @@ class RoomWatch:
     def reading(self, elapsed: float = 0.0) -> RoomReading:  # noqa: ARG002
         """Return the newest reading with its age; without values where that is above stale_s."""
         newest, at, trouble = self._newest
-        age = max(self._clock() - at, 0.0)
-        if newest is NO_READING or age > self._settings.stale_s:
-            return replace(NO_READING, trouble=trouble)
-        return replace(newest, age=age, trouble=trouble)
+        return aged(newest, max(self._clock() - at, 0.0), self._settings, trouble)
 
     def close(self) -> None:
         """End the thread and release the port."""

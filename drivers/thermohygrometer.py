@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol, runtime_checkable
 
 from dearig.drivers.errors import RigError
@@ -19,6 +19,7 @@ __all__ = [
     "Thermohygrometer",
     "ThermohygrometerDriver",
     "ThermohygrometerError",
+    "aged",
     "reading_finding",
 ]
 
@@ -60,6 +61,18 @@ class RoomReading:
 
 #: What is known where nothing is.
 NO_READING = RoomReading(math.nan, math.nan, math.inf)
+
+
+def aged(
+    newest: RoomReading, age: float, settings: ThermohygrometerSettings, trouble: str
+) -> RoomReading:
+    """Return the ``newest`` reading with its ``age`` in s; without values above ``stale_s``.
+
+    ``trouble`` says why there is no newer one, or is "".
+    """
+    if age > settings.stale_s:
+        return replace(NO_READING, trouble=trouble)
+    return replace(newest, age=age, trouble=trouble)
 
 
 class Thermohygrometer(Protocol):

@@ -10,14 +10,19 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from dearig.drivers.errors import RigError
 from dearig.drivers.instruments import room_driver
 from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
-from dearig.drivers.thermohygrometer import NO_READING, RoomReading, ThermohygrometerError
+from dearig.drivers.thermohygrometer import (
+    NO_READING,
+    RoomReading,
+    ThermohygrometerError,
+    aged,
+)
 from dearig.drivers.vaisala import VaisalaDriver
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.serial_line import SimulatedLine
@@ -159,9 +164,7 @@ class SimulatedSource:
             except RigError as error:
                 self._trouble = str(error).partition(";")[0]
         age = max(elapsed - self._at, 0.0)
-        if age > self._settings.stale_s:
-            return replace(NO_READING, trouble=self._trouble)
-        return replace(self._newest, age=age, trouble=self._trouble)
+        return aged(self._newest, age, self._settings, self._trouble)
 
     @property
     def port(self) -> str:
