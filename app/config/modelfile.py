@@ -21,7 +21,15 @@ from dearig.model.material import Branch, Film, Load, Network, Spring
 from dearig.model.springs import LIMIT, SPRING_LAWS
 from dearig.recording.files import check_output, replaced_when_done
 
-__all__ = ["FORMAT", "ModelFile", "load_actuator", "load_model", "model_toml", "save_model"]
+__all__ = [
+    "FORMAT",
+    "ModelFile",
+    "SpringName",
+    "load_actuator",
+    "load_model",
+    "model_toml",
+    "save_model",
+]
 
 FORMAT = "dearig-model/1"
 
@@ -30,7 +38,8 @@ FORMAT = "dearig-model/1"
 PARTS_MAX = 100
 
 _Positive = Annotated[float, Field(gt=0.0)]
-_Kind = Literal[
+#: Strain energies that a model file may name.
+SpringName = Literal[
     "neo-hookean", "gent", "arruda-boyce", "yeoh", "mooney-rivlin", "ogden", "ogden-two-terms",
     "extended-tube",
 ]  # fmt: skip
@@ -75,7 +84,7 @@ class _Load(Table):
 
 
 class _Spring(Table):
-    spring: _Kind = "gent"
+    spring: SpringName = "gent"
     modulus_Pa: Annotated[float, Field(ge=0.0)]
     limit: _Positive | None = None
     exponent: float | None = None

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
-from dearig.config.modelfile import load_model, save_model
+from dearig.cli.options import SpringChoice, SpringKind
+from dearig.config.modelfile import SpringName, load_model, save_model
 from dearig.model.film import Strip
 from dearig.model.material import Network, Spring
+from dearig.model.springs import SPRINGS
 from tests.tools.command import dearig, done, refused
 
 OGDEN = Strip(Network(Spring(40e3, kind="ogden", shape=(1.2,))))
@@ -31,6 +34,13 @@ def pulls(tmp_path_factory: pytest.TempPathFactory) -> Path:
         )  # fmt: skip
         done("import", folder / f"{name}.csv", "--out", folder / f"{name}.h5")
     return folder
+
+
+def test_options_and_model_files_name_every_energy() -> None:
+    """They list the energies themselves: the model is not imported for a list of options."""
+    assert sorted(SpringKind) == sorted(SPRINGS)
+    assert sorted(SpringChoice) == sorted([*SPRINGS, "choose"])
+    assert sorted(get_args(SpringName)) == sorted(SPRINGS)
 
 
 def test_the_energy_that_made_the_data_is_kept(pulls: Path, tmp_path: Path) -> None:

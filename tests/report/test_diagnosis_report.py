@@ -494,8 +494,10 @@ class TestFigures:
 
 def test_losing_candidates_are_folded_after_the_figures(page):
     outcome, found = page
+    folded = re.search(r"Candidates that explain less \(\d+\)", found.words)
     if not outcome.finding.rounds[0].candidates:
+        assert not folded
         return
+    assert folded
     assert "details" in found.seen
-    assert re.search(r"Candidates that explain less \(\d+\)", found.words)
     assert found.words.index("Measurement and model on validation") < found.words.index("Effects")
