@@ -16,10 +16,17 @@ import numpy as np
 
 from dearig.drivers.channels import HUMIDITY
 from dearig.recording.arrays import Overview
-from dearig.recording.layout import ENVIRONMENT_TYPE
+from dearig.recording.layout import ENVIRONMENT_TYPE, make_own_scale
 from dearig.recording.safe import item
 
-__all__ = ["MEANS", "Environment", "mean_conditions", "read_environment", "stored_means"]
+__all__ = [
+    "MEANS",
+    "Environment",
+    "EnvironmentWriter",
+    "mean_conditions",
+    "read_environment",
+    "stored_means",
+]
 
 #: Attributes of /entry with the means of a run, and the channels that they are of otherwise.
 MEANS = MappingProxyType({"temperature_degC": "temperature", "relative_humidity_percent": HUMIDITY})
@@ -57,6 +64,26 @@ class Environment:
         if not known.any():
             return None
         return np.asarray(np.interp(time, self.time[known], values[known]))
+
+
+class EnvironmentWriter:
+    """The table ``entry/environment`` of a run that is written."""
+
+    def __init__(self, entry: h5py.Group) -> None:
+        self._rows = entry.create_dataset(
+            "environment", shape=(0,), maxshape=(None,), chunks=(64,), dtype=ENVIRONMENT_TYPE
+        )
+        make_own_scale(self._rows)
+
+    def move_to(self, entry: h5py.Group) -> None:
+        """Write to the same table of another file from now on."""
+        self._rows = entry["environment"]
+
+    def append(self, sample: int, moment: float, temperature: float, humidity: float) -> None:
+        """Append a reading at ``moment``, Unix time in s: degrees Celsius and per cent, or NaN."""
+        row = self._rows.shape[0]
+        self._rows.resize((row + 1,))
+        self._rows[row] = (sample, moment, temperature, humidity)
 
 
 def read_environment(entry: h5py.Group, rate: float) -> Environment | None:

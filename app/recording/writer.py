@@ -29,6 +29,7 @@ from dearig.output_state import OutputState
 from dearig.recording.check_written import check_written
 from dearig.recording.checksums import ChecksumWriter
 from dearig.recording.disk_space import advice
+from dearig.recording.environment import EnvironmentWriter
 from dearig.recording.files import (
     check_output,
     in_words,
@@ -38,7 +39,6 @@ from dearig.recording.files import (
 )
 from dearig.recording.finish import finish
 from dearig.recording.layout import (
-    ENVIRONMENT_TYPE,
     EVENT_LEVELS,
     EVENT_TYPE,
     IDENTIFIER,
@@ -116,8 +116,7 @@ class RecordingWriter:
         self._metadata = metadata
         self._expected = samples_expected
         self._overlay = overlay
-        self._room: h5py.Dataset | None = None
-        self._has_room = environment
+        self._has_environment = environment
         self._first = first_sample
         self._rest = rest
         self._command = [c.name for c in identity.channels].index("voltage_command")
@@ -198,8 +197,7 @@ class RecordingWriter:
             entry = self._file["entry"]
             self._counts = [entry["data"][counts_name(c.name)] for c in self._channels]
             self._events, self._wall_clock = entry["events"], entry["wall_clock"]
-            self._room = entry["environment"] if self._has_room else None
-            for part in (self._pyramid, self._checksums, self._modelled):
+            for part in (self._pyramid, self._checksums, self._modelled, self._environment):
                 if part is not None:
                     part.move_to(entry)
             self._file.swmr_mode = True
@@ -237,11 +235,7 @@ class RecordingWriter:
         )
         self._pyramid = PyramidWriter(entry, len(self._channels), self._rate)
         self._checksums = ChecksumWriter(entry, len(self._channels), self._rate)
-        if self._has_room:
-            room = entry.create_dataset(
-                "environment", shape=(0,), maxshape=(None,), chunks=(64,), dtype=ENVIRONMENT_TYPE
-            )
-            make_own_scale(room)
+        self._environment = EnvironmentWriter(entry) if self._has_environment else None
         # created last: a flush writes datasets in this order and stops where the disk refuses one,
         # so that its note is in the file only if all samples up to it are
         self._wall_clock = entry.create_dataset(
@@ -332,13 +326,11 @@ class RecordingWriter:
 
     def room(self, sample: int, temperature: float, humidity: float) -> None:
         """Record a reading before ``sample``: degrees Celsius and per cent, NaN for no value."""
-        if self._room is None:
+        if self._environment is None:
             raise ValueError("a recording without readings of the room cannot take one")
         with self._writing():
-            row = self._room.shape[0]
-            self._room.resize((row + 1,))
             at = max(sample - self._first, 0)
-            self._room[row] = (at, self._now(), temperature, humidity)
+            self._environment.append(at, self._now(), temperature, humidity)
             self._dirty = True
             self._flush_when_due()
 
@@ -423,7 +415,7 @@ class RecordingWriter:
             replace(self._metadata, provenance={**self._metadata.provenance, **from_here}),
             fsync=self._fsync,
             overlay=self._overlay,
-            environment=self._has_room,
+            environment=self._has_environment,
             first_sample=first_sample,
             rest=self._rest,
             now=self._now,
