@@ -1,5 +1,8 @@
 """Write a recording during a run: counts are appended, and a kill loses nothing flushed.
 
+It is one thing of over 600 lines: the order of creating, appending, flushing and closing is what
+makes a file survive, and each step relies on the ones before.
+
 The file survives kills at any moment and at every write boundary with the library version of
 ``layout.LIBVER``, the whole layout created first, then SWMR mode, and flushes of the whole file.
 After flushes of single datasets, channels could differ by one flush interval.
