@@ -10,7 +10,7 @@ from dearig.analysis.compatibility import base_model, check_branches
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.early_ends import choose
 from dearig.analysis.outcomes import Comparison
-from dearig.analysis.records import as_record, compare, open_all
+from dearig.analysis.records import Source, as_record, compare, open_all
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.fitting import Estimate, fit_shared
@@ -31,7 +31,7 @@ class SharedOutcome:
 
 @for_simulations()
 def identify_shared(
-    paths: Sequence[Path],
+    train: Sequence[Source],
     own: Sequence[str],
     *,
     branches: int = 3,
@@ -40,13 +40,13 @@ def identify_shared(
     ended_early: str = "keep",
     progress: Progress = quiet,
 ) -> list[SharedOutcome]:
-    """Fit one model to the recordings ``paths`` of a film; ``own`` parameters differ between them.
+    """Fit one model to the recordings ``train`` of a film; ``own`` parameters differ between them.
 
     ``own`` are names such as mu_0 and permittivity. Recordings that ``ended_early`` leaves out are
     not in the result. Raises ``InputError`` for recordings and names that cannot be fitted.
     """
     check_branches(branches)
-    recordings, _ = choose(open_all(paths), ended_early)
+    recordings, _ = choose(open_all(train), ended_early)
     base = base_model(recordings, branches, spring, None, None)
     records = [as_record(recording, drive) for recording in recordings]
     try:

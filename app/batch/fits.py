@@ -12,7 +12,7 @@ import logging
 import math
 import tempfile
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import import_module, metadata
@@ -30,7 +30,6 @@ from dearig.config.modelfile import load_model
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import file_sha256, journal_of, one_line
-from dearig.recording.index import glance
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import Recording
 
@@ -145,8 +144,9 @@ def _row(path: Path, name: str, options: StudyOptions, progress: Progress) -> Ro
     row: Row = {"recording": name, "state": "failed", "reason": ""}
     with ONE_AT_A_TIME:
         try:
-            row |= about(path)
-            row |= _computed(path, options, progress)
+            recording = open_recording(path)
+            row |= about(recording)
+            row |= _computed(recording, options, progress)
             row["state"] = "ok"
         except InputError as error:
             row["reason"] = str(error).replace(str(path), name)
@@ -158,26 +158,23 @@ def _row(path: Path, name: str, options: StudyOptions, progress: Progress) -> Ro
     return row
 
 
-def about(path: Path) -> Row:
+def about(recording: Recording) -> Row:
     """Return the columns that describe the recording: hash, start, film, rig, duration, ..."""
-    entry = glance(path, path.name, path.stat().st_size)
-    if entry.trouble:
-        raise InputError(entry.trouble)
-    recording = open_recording(path)
+    noted = recording.provenance
     return {
-        "sha256": file_sha256(path),
-        "started": entry.start_time,
-        "film": entry.film_id,
-        "rig": entry.rig,
-        "operator": entry.operator,
-        "title": entry.title,
+        "sha256": recording.sha256,
+        "started": str(noted.get("start_time", "")),
+        "film": recording.film_id,
+        "rig": str(noted.get("rig", "")),
+        "operator": str(noted.get("operator", "")),
+        "title": recording.title,
         "temperature_degC": recording.temperature_degC,
         "relative_humidity_percent": recording.relative_humidity_percent,
-        "duration_s": entry.duration_s,
-        "samples": entry.samples,
-        "complete": entry.complete,
+        "duration_s": recording.duration,
+        "samples": recording.samples,
+        "complete": recording.complete,
         "cycles": _cycles(recording),
-        **_peaks(recording, entry.peaks),
+        **_peaks(recording),
     }
 
 
@@ -190,27 +187,32 @@ def _cycles(recording: Recording) -> int | None:
     return int(np.count_nonzero(high[1:] & ~high[:-1]) + high[0])
 
 
-def _peaks(recording: Recording, peaks: Mapping[str, float]) -> Row:
+def _peaks(recording: Recording) -> Row:
     if recording.kind != "actuator":
         return {}
-    volts, metres = peaks.get("voltage_command"), peaks.get("displacement")
     return {
-        "peak_voltage_kV": None if volts is None else volts * 1e-3,
-        "peak_displacement_mm": None if metres is None else metres * 1e3,
+        "peak_voltage_kV": _peak(recording.voltage_command, 1e-3),
+        "peak_displacement_mm": _peak(recording.displacement, 1e3),
     }
 
 
-def _computed(path: Path, options: StudyOptions, progress: Progress) -> Row:
+def _peak(values: np.ndarray | None, factor: float) -> float | None:
+    """Return the value of the largest size times ``factor``, with its sign; None without any."""
+    known = values[np.isfinite(values)] if values is not None else np.empty(0)
+    return float(known[np.argmax(np.abs(known))]) * factor if known.size else None
+
+
+def _computed(recording: Recording, options: StudyOptions, progress: Progress) -> Row:
     if options.do == "validate":
         with tempfile.TemporaryDirectory(prefix="dearig-study-") as folder:
             model = Path(folder, "model.toml")
             model.write_text(options.model, "utf-8", newline="\n")
             loaded = load_model(model)
-        validated = validate_model(loaded, [path], drive=options.drive, progress=progress)
+        validated = validate_model(loaded, [recording], drive=options.drive, progress=progress)
         return errors_of(validated.comparisons[0])
     if options.do == "identify":
         fitted = identify_recordings(
-            [path], branches=(options.branches,), spring=options.spring, drive=options.drive,
+            [recording], branches=(options.branches,), spring=options.spring, drive=options.drive,
             intervals=options.intervals, ended_early=options.ended_early, progress=progress,
         )  # fmt: skip
         return {
@@ -219,8 +221,8 @@ def _computed(path: Path, options: StudyOptions, progress: Progress) -> Row:
             "converged": bool(fitted.fit.converged),
         }
     found = diagnose_recordings(
-        [path], branches=options.branches, drive=options.drive, ended_early=options.ended_early,
-        progress=progress,
+        [recording], branches=options.branches, drive=options.drive,
+        ended_early=options.ended_early, progress=progress,
     )  # fmt: skip
     if found.finding.interrupted:
         # a person's ctrl-C is not a result that could be kept

@@ -15,6 +15,8 @@ from dearig.batch.numbers import errors_of, parameter_of
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import one_line
+from dearig.recording.reader import open_recording
+from dearig.recording.recording import Recording
 
 if TYPE_CHECKING:
     from dearig.batch.studies import Subject
@@ -47,13 +49,14 @@ def fit_film(task: Task, progress: Progress = quiet) -> Row:
     if not isinstance(task, FilmTask):
         raise TypeError(f"{task.name} is no task of a film")
     rows: dict[str, Row] = {}
-    good: list[tuple[str, Path]] = []
+    good: list[tuple[str, Recording]] = []
     with ONE_AT_A_TIME:
         for name, path in task.members:
             row: Row = {"recording": name, "state": "failed", "reason": ""}
             try:
-                row |= about(path)
-                good.append((name, path))
+                recording = open_recording(path)
+                row |= about(recording)
+                good.append((name, recording))
             except InputError as error:
                 row["reason"] = str(error).replace(str(path), name)
             rows[name] = row
@@ -61,8 +64,8 @@ def fit_film(task: Task, progress: Progress = quiet) -> Row:
         try:
             _fit(task.options, good, rows, progress)
         except InputError as error:
-            for name, path in good:
-                rows[name]["reason"] = str(error).replace(str(path), name)
+            for name, recording in good:
+                rows[name]["reason"] = str(error).replace(str(recording.path), name)
         except Exception as error:  # one film must not cost the rows of the others
             log.exception("unexpected error with film %s", task.name)
             for name, _ in good:
@@ -74,7 +77,7 @@ def fit_film(task: Task, progress: Progress = quiet) -> Row:
 
 def _fit(
     options: StudyOptions,
-    good: Sequence[tuple[str, Path]],
+    good: Sequence[tuple[str, Recording]],
     rows: dict[str, Row],
     progress: Progress,
 ) -> None:
@@ -82,12 +85,13 @@ def _fit(
     if not good:
         return
     fitted = identify_shared(
-        [path for _, path in good], options.own, branches=options.branches, spring=options.spring,
-        drive=options.drive, ended_early=options.ended_early, progress=progress,
+        [recording for _, recording in good], options.own, branches=options.branches,
+        spring=options.spring, drive=options.drive, ended_early=options.ended_early,
+        progress=progress,
     )  # fmt: skip
     by_path = {outcome.path: outcome for outcome in fitted}
-    for name, path in good:
-        outcome = by_path.get(path)
+    for name, recording in good:
+        outcome = by_path.get(recording.path)
         if outcome is None:
             rows[name]["reason"] = f"{name}: its run ended early, and such ones are left out"
             continue

@@ -14,6 +14,7 @@ from dearig.batch.studies import StudyTable, study_films, subjects_of, with_mode
 from dearig.drivers.rig import Block
 from dearig.errors import InputError
 from dearig.model.fitting import Estimate
+from dearig.recording.recording import Recording
 from tests.tools.command import dearig, refused
 from tests.tools.recordings import run_counts, writer
 
@@ -37,7 +38,10 @@ def fitted(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     """Films fitted together by names; the fit itself is one of the model's tests."""
     together: list[list[str]] = []
 
-    def identify(paths: list[Path], own: tuple[str, ...], **_: object) -> list[SharedOutcome]:
+    def identify(
+        recordings: list[Recording], own: tuple[str, ...], **_: object
+    ) -> list[SharedOutcome]:
+        paths = [recording.path for recording in recordings]
         together.append([path.name for path in paths])
         assert own == OPTIONS.own
         if paths[0].name == "c.h5":

@@ -2,12 +2,21 @@
 
 ``python -m tests.benchmarks.bench_study --recordings 8``. The cluster is of real processes, which
 are killed; it needs the extra ``cluster``.
+
+``python -m tests.benchmarks.bench_study --beside 1000`` plays ``dearig study --do identify`` with
+two processes beside bare fits of the same recordings: ``identify_recordings`` of each path, in a
+``multiprocessing`` pool of two. Both are whole programs. They run in turns of a few seconds, the
+other one being stopped (SIGSTOP), so that the load of the machine is the same for both. It prints
+their processor times, those of blocks of a tenth of the recordings, and the sums of their turns.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
+import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -15,12 +24,19 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+import psutil
+
 from dearig.acquisition.run import RunOptions, record
+from dearig.analysis.identify import identify_recordings
 from dearig.batch.engines import LocalEngine, engine_at
 from dearig.batch.fits import Row, StudyOptions, Task, fit_task
+from dearig.batch.numbers import parameters_of
 from dearig.batch.studies import study_recordings, subjects_of
+from dearig.batch.table_file import read_table
 from dearig.config.rigfile import load_rig_file
 from dearig.config.sequencefile import parse_sequence
 from tests.tools.command import LOBE, SLOW_RIG, write
@@ -28,14 +44,14 @@ from tests.tools.machine import cores_and_load
 
 
 def made(folder: Path, count: int) -> Path:
-    """Recordings of the simulated rig, each with its own noise."""
+    """Recordings of the rigs ``sim:0``, ``sim:1``, ...: other effects, and other noise."""
     recordings = folder / "recordings"
     recordings.mkdir()
     rig_file = load_rig_file(write(folder / "rig.toml", SLOW_RIG))
     loaded = parse_sequence(LOBE, "lobe", folder)
     for seed in range(count):
         out = recordings / f"r{seed:04d}.h5"
-        record(loaded, "sim", rig_file, out, RunOptions(seed=seed))
+        record(loaded, f"sim:{seed}", rig_file, out, RunOptions(seed=seed))
     return recordings
 
 
@@ -85,18 +101,134 @@ def after(rows: int, act: Callable[[], None]) -> Callable[[str, float], None]:
     return progress
 
 
+_TURN_S = 5.0  # that one of two programs runs while the other is stopped
+_BLOCKS = 10
+
+
+def bare_fit(path: str) -> tuple[str, float]:
+    """Return the name of a recording, and mu_0 in kPa of a model with one branch."""
+    found = parameters_of(identify_recordings([path], branches=(1,)))
+    return Path(path).name, next(p["value"] for p in found if p["name"] == "mu_0_kPa")
+
+
+def bare(recordings: Path, out: Path) -> None:
+    """Fit each of ``recordings`` in a pool of two, and append a line to ``out`` for each."""
+    paths = [str(path) for path in sorted(recordings.glob("*.h5"))]
+    with multiprocessing.get_context("spawn").Pool(2) as pool, out.open("w") as told:
+        for name, value in pool.imap_unordered(bare_fit, paths):
+            told.write(f"{name} {value!r}\n")
+            told.flush()
+        pool.close()
+        pool.join()
+
+
+@dataclass
+class Turns:
+    """A program that runs in turns, and what it had done after each of them."""
+
+    command: list[str]
+    count: Callable[[], int]
+    wall: float = 0.0
+    cpu: float = 0.0
+    seen: list[tuple[int, float]] = field(default_factory=lambda: [(0, 0.0)])
+    ended: bool = False
+
+    def __post_init__(self) -> None:
+        self._process = subprocess.Popen(
+            self.command, start_new_session=True, stdout=subprocess.DEVNULL
+        )
+        os.killpg(self._process.pid, signal.SIGSTOP)
+
+    def take(self) -> None:
+        """Run for one turn."""
+        os.killpg(self._process.pid, signal.SIGCONT)
+        began = time.monotonic()
+        usage = None
+        while usage is None and time.monotonic() - began < _TURN_S:
+            pid, status, found = os.wait4(self._process.pid, os.WNOHANG)
+            if pid:
+                assert status == 0, self.command
+                usage = found
+            else:
+                time.sleep(0.01)
+        self.wall += time.monotonic() - began
+        if usage is not None:
+            # with that of its children, which it has waited for
+            self.cpu, self.ended = usage.ru_utime + usage.ru_stime, True
+        else:
+            os.killpg(self._process.pid, signal.SIGSTOP)
+            root = psutil.Process(self._process.pid)
+            spent = [p.cpu_times() for p in (root, *root.children(recursive=True))]
+            self.cpu = sum(each.user + each.system for each in spent)
+        self.seen.append((self.count(), self.cpu))
+
+    def blocks(self, recordings: int) -> np.ndarray:
+        """Processor time in s of each tenth of the recordings."""
+        rows, cpu = np.array(self.seen, dtype=float).T
+        return np.diff(np.interp(np.linspace(0, recordings, _BLOCKS + 1), rows, cpu))
+
+
+def beside(folder: Path, count: int) -> None:
+    """Play a study beside bare fits of the same ``count`` recordings, in turns."""
+    recordings = made(folder, count)
+    bare_fit(str(next(recordings.glob("*.h5"))))  # the kernels are compiled and kept
+    told, out = folder / "bare.txt", folder / "out"
+    me = [sys.executable, "-m", "tests.benchmarks.bench_study"]
+    fits = Turns(
+        [*me, "--bare", str(recordings), str(told)],
+        lambda: told.read_text().count("\n") if told.exists() else 0,
+    )
+    study = Turns(
+        [sys.executable, "-m", "dearig", "study", str(recordings), "--do", "identify",
+         "--branches", "1", "--workers", "2", "--out", str(out)],
+        lambda: len(list((out / "cache").glob("*.json"))),
+    )  # fmt: skip
+    while not (fits.ended and study.ended):
+        for each in (fits, study):
+            if not each.ended:
+                each.take()
+    values = dict(line.split() for line in told.read_text().splitlines())
+    rows = read_table(out / "study.csv")
+    same = sum(float(values[row["recording"]]) == row["mu_0_kPa"] for row in rows)
+    first, second = fits.blocks(count), study.blocks(count)
+    parts = 100.0 * (second / first - 1.0)
+    more = 100.0 * (study.cpu / fits.cpu - 1.0)
+    print(
+        f"{count} recordings of sim:0 to sim:{count - 1}, one branch with intervals, two "
+        f"processes; mu_0 the same to the last digit in {same}\n"
+        f"bare fits:     {fits.cpu:7.1f} s of a core, {fits.wall:7.1f} s of turns "
+        f"({fits.cpu / count:.3f} s a fit)\n"
+        f"dearig study:  {study.cpu:7.1f} s of a core, {study.wall:7.1f} s of turns\n"
+        f"study over bare fits: {more:+.1f} % of processor time, "
+        f"{100.0 * (study.wall / fits.wall - 1.0):+.1f} % of wall time (limit: 5 %)\n"
+        f"by tenths of the recordings: {', '.join(f'{part:+.1f}' for part in parts)} %; mean "
+        f"{parts.mean():+.1f} +- {parts.std(ddof=1) / np.sqrt(parts.size):.1f} %"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--recordings", type=int, default=8)
     parser.add_argument("--empty", type=int, default=300, help="Tasks without work.")
-    count, empty = (vars(parser.parse_args())[name] for name in ("recordings", "empty"))
+    parser.add_argument("--beside", type=int, default=0, metavar="RECORDINGS")
+    parser.add_argument("--bare", type=Path, nargs=2, help=argparse.SUPPRESS)
+    asked = parser.parse_args()
+    count, empty = asked.recordings, asked.empty
+    if asked.bare:
+        bare(*asked.bare)
+        return
+    if asked.beside:
+        with tempfile.TemporaryDirectory() as made_folder:
+            beside(Path(made_folder), asked.beside)
+        print(cores_and_load())
+        return
     options = StudyOptions("identify")
     # worker processes import nothing from the working folder, so that it is another one
     with tempfile.TemporaryDirectory() as made_folder, chdir(made_folder):
         folder = Path(made_folder)
         subjects = subjects_of([made(folder, count)], folder / "out")
         began = time.process_time()
-        bare = [fit_task(Task(s.name, s.path, "", options)) for s in subjects]
+        alone = [fit_task(Task(s.name, s.path, "", options)) for s in subjects]
         each = (time.process_time() - began) / count
         began = time.process_time()
         many = [type(subjects[0])(f"{i}", subjects[i % count].path) for i in range(empty)]
@@ -114,7 +246,7 @@ def main() -> None:
             took = time.monotonic() - began
             assert [
                 row["mu_0_kPa"] for row in sorted(table.rows, key=lambda r: r["recording"])
-            ] == [row["mu_0_kPa"] for row in bare]
+            ] == [row["mu_0_kPa"] for row in alone]
             print(f"{name:24s} {took:6.1f} s  {table.moved}")
             return table.table.read_bytes()
 
