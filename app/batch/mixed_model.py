@@ -48,18 +48,18 @@ class Sample:
 class LinearFit:
     """Fitted model: ``intercept`` at the mean ``centre`` (p,) of the columns, ``slopes`` (p,).
 
-    ``errors`` (p,) are standard errors, ``quantiles`` (p,) those of Student's t by which a 95 %
-    interval is wider on either side, ``p_values`` (p,) of no effect. ``covariance`` (1 + p, 1 + p)
-    is that of intercept and slopes. ``film_intercepts`` (films,) are differences from the
-    intercept. ``between`` and ``scatter`` are the standard deviations tau and sigma, and
-    ``measured`` is the median of the known errors. ``mixed``: films are a random intercept; else
-    the model is ordinary least squares, and ``why`` says why.
+    ``errors`` (p,) are standard errors, ``degrees`` (p,) their degrees of freedom, ``p_values``
+    (p,) those of no effect. ``covariance`` (1 + p, 1 + p) is that of intercept and slopes.
+    ``film_intercepts`` (films,) are differences from the intercept. ``between`` and ``scatter`` are
+    the standard deviations tau and sigma, and ``measured`` is the median of the known errors.
+    ``mixed``: films are a random intercept; else the model is ordinary least squares, and ``why``
+    says why.
     """
 
     intercept: float
     slopes: np.ndarray
     errors: np.ndarray
-    quantiles: np.ndarray
+    degrees: np.ndarray
     p_values: np.ndarray
     covariance: np.ndarray
     centre: np.ndarray
@@ -71,9 +71,13 @@ class LinearFit:
     mixed: bool
     why: str = ""
 
-    def interval(self, i: int) -> tuple[float, float]:
-        """Return the 95 % interval of slope ``i``."""
-        half = float(self.quantiles[i] * self.errors[i])
+    def quantile(self, i: int, confidence: float = 0.95) -> float:
+        """Return the standard errors from slope ``i`` to the ends of its interval (Student's t)."""
+        return float(t_distribution.ppf(0.5 + 0.5 * confidence, self.degrees[i]))
+
+    def interval(self, i: int, confidence: float = 0.95) -> tuple[float, float]:
+        """Return the interval of slope ``i`` that holds the truth with this ``confidence``."""
+        half = self.quantile(i, confidence) * float(self.errors[i])
         return float(self.slopes[i]) - half, float(self.slopes[i]) + half
 
 
@@ -205,7 +209,7 @@ def _made(
         intercept=float(solution[0]),
         slopes=solution[1:],
         errors=errors,
-        quantiles=t_distribution.ppf(0.975, degrees),
+        degrees=degrees,
         p_values=2.0 * t_distribution.sf(ratios, degrees),
         covariance=covariance,
         centre=centre,

@@ -62,6 +62,8 @@ VERDICTS = {
 _ERRORS = ("rms_um", "rms_kPa", "nrmse_pct", "peak_displacement_mm")
 _RUNS_MIN = 5  # with a value, for a trend
 _SIGNIFICANT = 0.05
+#: Of a single interval, and of all simultaneous ones together.
+_CONFIDENCE = 1.0 - _SIGNIFICANT
 _QUANTILE_95 = float(norm.ppf(0.975))  # an interval of 95 % leaves out 2.5 % on either side
 
 
@@ -79,16 +81,18 @@ class FilmSlope:
 class Effect:
     """Effect of a column on a number: ``slope`` per unit of the column, with its 95 % interval.
 
-    Of a number on a logarithmic scale the slope is in percent per unit. ``p`` is the probability of
-    one as large if there were none, ``p_equal`` that of slopes as unequal if all films had one
-    (None where that cannot be asked). ``verdict`` is a key of ``VERDICTS``; with "one_film" the
-    slope is that of the other films.
+    ``simultaneous`` is the interval that holds the truth together with those of all other effects
+    of the table with 95 %. Of a number on a logarithmic scale the slope is in percent per unit.
+    ``p`` is the probability of one as large if there were none, ``p_equal`` that of slopes as
+    unequal if all films had one (None where that cannot be asked). ``verdict`` is a key of
+    ``VERDICTS``; with "one_film" the slope is that of the other films.
     """
 
     column: Column
     slope: float
     low: float
     high: float
+    simultaneous: tuple[float, float]
     p: float
     p_equal: float | None
     verdict: str
@@ -171,7 +175,7 @@ class Trend:
         y = self.fit.intercept + self.fit.slopes[i] * shifted
         c = self.fit.covariance
         variance = c[0, 0] + 2.0 * shifted * c[0, 1 + i] + shifted**2 * c[1 + i, 1 + i]
-        half = self.fit.quantiles[i] * np.sqrt(np.maximum(variance, 0.0))
+        half = self.fit.quantile(i) * np.sqrt(np.maximum(variance, 0.0))
         return Curve(x, self.natural(y), self.natural(y - half), self.natural(y + half))
 
     def adjusted(self, i: int) -> tuple[np.ndarray, np.ndarray]:
@@ -200,6 +204,16 @@ class Trends:
     proposals: tuple[Proposal, ...]
     days: np.ndarray
 
+    @property
+    def intervals(self) -> int:
+        """Number of simultaneous intervals: one for each effect."""
+        return sum(len(trend.design.columns) for trend in self.trends)
+
+    @property
+    def confidence_of_each(self) -> float:
+        """Confidence of each of the simultaneous intervals."""
+        return _sidak(self.intervals)
+
     def effect_rows(self) -> list[dict[str, Any]]:
         """Return one row of plain values for each number and column, for a table."""
         return [
@@ -210,6 +224,8 @@ class Trends:
                 "slope": effect.slope,
                 "low95": effect.low,
                 "high95": effect.high,
+                "low95_simultaneous": effect.simultaneous[0],
+                "high95_simultaneous": effect.simultaneous[1],
                 "slope_unit": "percent" if trend.relative else "of the number",
                 "p": effect.p,
                 "p_equal_slopes": effect.p_equal,
@@ -318,7 +334,8 @@ def find_trends(
         raise InputError(
             f"{source}: no trend can be computed. {' '.join(dict.fromkeys(told))}".rstrip()
         )
-    found = _judged(found)
+    each = _sidak(sum(len(trend.design.columns) for trend in found))
+    found = _judged([_with_effects(trend, each) for trend in found])
     every = np.ones(len(good), dtype=bool)
     return Trends(
         tuple(good), tuple(films), len(rows) - len(good), tuple(found),
@@ -334,7 +351,10 @@ def _trend(
     name: str,
     told: list[str],
 ) -> Trend | None:
-    """Return the trend of one number; where there is none, ``told`` receives the reason."""
+    """Return the trend of one number, without its effects.
+
+    Where there is none, ``told`` receives the reason.
+    """
     at = np.array([i for i, row in enumerate(rows) if _is_known(row, name)], dtype=int)
     if at.size < _RUNS_MIN:
         told.append(f"{name}: {at.size} runs have a value that their data determine.")
@@ -373,9 +393,7 @@ def _trend(
     design = replace(design, columns=local)
     names = tuple(films[int(at[film == f][0])] for f in range(sample.films))
     model = explain(sample, names, relative)
-    effects = tuple(_effect(model, column, i) for i, column in enumerate(local))
-    changes = tuple(_changes(rows, at, model))
-    return Trend(name, at, values, low, high, design, model, effects, changes)
+    return Trend(name, at, values, low, high, design, model, (), tuple(_changes(rows, at, model)))
 
 
 def _is_known(row: Mapping[str, Any], name: str) -> bool:
@@ -401,8 +419,27 @@ def _high(row: Mapping[str, Any], name: str) -> float:
     return float(value + (value - _low(row, name)) if high is None else high)
 
 
-def _effect(model: Explained, column: Column, i: int) -> Effect:
-    """Return the effect of ``column``, of place ``i``, and which films have another one."""
+def _sidak(intervals: int) -> float:
+    """Return the confidence of each of so many ``intervals`` that hold the truth at once with 95 %.
+
+    By Šidák (J. Am. Stat. Assoc. 62, 1967, 626): it holds for all correlations of normal errors, so
+    that those between numbers, which are fitted separately, need not be known.
+    """
+    return float(_CONFIDENCE ** (1.0 / intervals))
+
+
+def _with_effects(trend: Trend, each: float) -> Trend:
+    """Return the trend with its effects; ``each`` is the confidence of a simultaneous interval."""
+    columns = enumerate(trend.design.columns)
+    effects = tuple(_effect(trend.model, column, i, each) for i, column in columns)
+    return replace(trend, effects=effects)
+
+
+def _effect(model: Explained, column: Column, i: int, each: float) -> Effect:
+    """Return the effect of ``column``, of place ``i``, and which films have another one.
+
+    ``each`` is the confidence of its simultaneous interval.
+    """
     sample, fit, told = model.sample, model.fit, model.told
     p_equal = slopes_differ(sample, fit.variances, i) if sample.films > 1 else None
     places = model.slopes_of(i)
@@ -416,8 +453,10 @@ def _effect(model: Explained, column: Column, i: int) -> Effect:
     if verdict in ("common", "untold") and low <= 0.0 <= high:
         verdict = "none"
     own = tuple(_own_slope(model, i, place) for place in places)
+    wide = fit.interval(i, each)
     return Effect(
-        column, told(slope), told(low), told(high), float(fit.p_values[i]), p_equal, verdict, own,
+        column, told(slope), told(low), told(high), (told(wide[0]), told(wide[1])),
+        float(fit.p_values[i]), p_equal, verdict, own,
     )  # fmt: skip
 
 
@@ -426,7 +465,7 @@ def _own_slope(model: Explained, i: int, place: int) -> FilmSlope:
     fit = model.fit
     at = [1 + i, 1 + place]
     slope = float(fit.slopes[i] + fit.slopes[place])
-    half = fit.quantiles[place] * math.sqrt(max(float(fit.covariance[np.ix_(at, at)].sum()), 0.0))
+    half = fit.quantile(place) * math.sqrt(max(float(fit.covariance[np.ix_(at, at)].sum()), 0.0))
     film = model.films[model.extras[place - model.columns].film]
     told = model.told
     return FilmSlope(film, told(slope), told(slope - half), told(slope + half))

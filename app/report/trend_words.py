@@ -23,6 +23,7 @@ __all__ = [
 ]
 
 _PROPOSALS = 6  # that are shown; all are in the JSON
+_AT_ONCE = "All at once, 95 %"  # head of a column
 
 
 def trends_json(trends: Trends, source: Path, written: dict[str, Path | None]) -> dict[str, Any]:
@@ -35,6 +36,12 @@ def trends_json(trends: Trends, source: Path, written: dict[str, Path | None]) -
         "films": len(set(trends.films)),
         "files": {k: None if path is None else str(path) for k, path in written.items()},
         "left_out": list(trends.left_out),
+        "simultaneous": {
+            "method": "Šidák",
+            "confidence": 0.95,
+            "intervals": trends.intervals,
+            "confidence_of_each": trends.confidence_of_each,
+        },
         "numbers": [_trend_json(trend) for trend in trends.trends],
         "next": [
             {"kind": p.kind, "columns": list(p.columns), "sentence": p.sentence}
@@ -61,6 +68,7 @@ def _trend_json(trend: Trend) -> dict[str, Any]:
                 "per": effect.column.unit,
                 "slope": effect.slope,
                 "ci95": [effect.low, effect.high],
+                "ci95_simultaneous": list(effect.simultaneous),
                 "p": effect.p,
                 "p_equal_slopes": effect.p_equal,
                 "verdict": effect.verdict,
@@ -92,6 +100,7 @@ def trends_sentences(trends: Trends) -> Iterator[str]:
     failed = f"; {trends.failed} more have no result" if trends.failed else ""
     yield f"{count} recordings of {films} film{'' if films == 1 else 's'}{failed}."
     yield from _models(trends)
+    yield from _at_once(trends)
     every = [(trend, effect) for trend in trends.trends for effect in trend.effects]
     for verdict in ("common", "untold", "differs", "one_film"):
         for trend, effect in every:
@@ -124,6 +133,16 @@ def _models(trends: Trends) -> Iterator[str]:
         )
 
 
+def _at_once(trends: Trends) -> Iterator[str]:
+    if trends.intervals > 1:
+        yield (
+            f"A single 95 % interval of an effect misses the true slope in 1 of 20 studies. The "
+            f"{trends.intervals} intervals under “{_AT_ONCE}” hold all true slopes at once in 95 % "
+            f"of studies (Šidák; each by itself in "
+            f"{significant(100.0 * trends.confidence_of_each, 4)} %)."
+        )
+
+
 def _effect_sentence(trend: Trend, effect: Effect) -> str:
     per = _per(effect)
     low, high = sorted((effect.low, effect.high))
@@ -134,7 +153,8 @@ def _effect_sentence(trend: Trend, effect: Effect) -> str:
     if effect.verdict == "untold":
         return f"{name}: {size}; with one film it is not known whether it is common."
     own = "; ".join(
-        f"{slope.film} has {significant(slope.slope, 3)} ({interval_of(slope.low, slope.high)})"
+        f"{slope.film} has {significant(slope.slope, 3)} {_unit(trend)} {per} "
+        f"({interval_of(*sorted((slope.low, slope.high)))})"
         for slope in effect.own
     )
     if effect.verdict == "one_film":
@@ -201,6 +221,7 @@ def effect_table(trends: Trends) -> Table:
                 f"{number_name(trend.name, unit=False)}, {effect.column.label}",
                 f"{_signed(effect.slope, effect)} {_unit(trend)} {_per(effect)}",
                 interval_of(*sorted((effect.low, effect.high))),
+                interval_of(*sorted(effect.simultaneous)),
                 VERDICTS[effect.verdict],
             ),
             muted=effect.verdict in ("none", "doubtful"),
@@ -209,7 +230,7 @@ def effect_table(trends: Trends) -> Table:
         for trend in trends.trends
         for effect in trend.effects
     ]
-    head = (("", ""), ("Slope", ""), ("95 % interval", ""), ("Films", ""))
+    head = (("", ""), ("Slope", ""), ("95 % interval", ""), (_AT_ONCE, ""), ("Films", ""))
     return Table("Effects", head, tuple(rows), " ".join(map(_left_out, trends.left_out)))
 
 

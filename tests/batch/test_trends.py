@@ -55,6 +55,27 @@ def test_common_effects_are_recovered_beside_those_of_single_films(story: Trends
             assert abs(effect.slope - true) < half
 
 
+def test_simultaneous_intervals_are_those_of_sidak(story: Trends) -> None:
+    assert story.intervals == 8
+    assert math.isclose(story.confidence_of_each**8, 0.95)
+    # the normal quantiles of (1 + 0.95^(1/8)) / 2 and 0.975; Student's t is a little wider
+    for trend in story.trends:
+        for effect in trend.effects:
+            wide = np.log1p(np.array(effect.simultaneous) / 100.0)
+            single = np.log1p(np.array([effect.low, effect.high]) / 100.0)
+            ratio = np.ptp(wide) / np.ptp(single)
+            assert 2.727 / 1.960 < ratio < 1.02 * 2.727 / 1.960
+            assert math.isclose(wide.mean(), single.mean())
+
+
+def test_one_number_over_one_column_has_one_interval() -> None:
+    (trend,) = trends_of(
+        made_rows(2, films=6), numbers=["mu_0_kPa"], against=["temperature_degC"]
+    ).trends
+    (effect,) = trend.effects
+    assert effect.simultaneous == (effect.low, effect.high)
+
+
 def test_one_films_own_slope_and_its_neighbours_jump_are_told_apart(story: Trends) -> None:
     mu = story.trends[0]
     (own,) = mu.effects[0].own
@@ -149,6 +170,12 @@ def test_the_command_writes_tables_a_report_and_json(tmp_path: Path) -> None:
     told = json.loads((tmp_path / "trends.json").read_text("utf-8"))
     assert told["format"] == "dearig-trends/1"
     assert [number["name"] for number in told["numbers"]] == ["mu_0_kPa"]
+    effects = told["numbers"][0]["effects"]
+    assert told["simultaneous"]["intervals"] == len(effects)
+    for effect in effects:
+        wide, single = effect["ci95_simultaneous"], effect["ci95"]
+        assert wide[0] < single[0] < single[1] < wide[1]
+    assert "hold all true slopes at once in 95 % of studies" in " ".join(answer.out.split())
     page = (tmp_path / "trends.html").read_text("utf-8")
     assert page.count("<svg") == 2
     assert {row["column"] for row in read_table(tmp_path / "trends.csv")} >= {"temperature"}
