@@ -31,7 +31,7 @@ from dearig.model.verdict import (
     UNEXPLAINED,
 )
 
-__all__ = ["conclude"]
+__all__ = ["Conclusion", "conclude"]
 
 _ITERATIONS = 8  # of the last fits, on every sample
 _NAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
@@ -39,7 +39,7 @@ _TRUSTED_SHARE = 0.8  # of the same: what explains less may be a disguise, and p
 _ALIKE = 10.0  # of the criterion: odds of e^5, below which two explanations are not told apart
 
 
-class _Conclusion:
+class Conclusion:
     """One search's end, with the fits that the conclusion adds."""
 
     def __init__(self, found: Found, fitter: Fitter, without: Callable[[Fit, str], Fit]) -> None:
@@ -131,6 +131,17 @@ class _Conclusion:
         explained = self.judge.base_cost - self.found.best.cost
         return min(s.form_error**2 * explained, s.form_error)
 
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether what was found explains too little to predict other recordings by it."""
+        return not self.is_small and self.explained < _TRUSTED_SHARE
+
+    def for_others(self) -> Actuator | Strip:
+        """Return the model that predicts other recordings."""
+        if self.is_doubtful:
+            return self.first.model
+        return self.predicting(self.found.best, self.last)
+
     def predicting(self, fit: Fit, careful: Fit) -> Actuator | Strip:
         """Return the model that predicts other recordings: without what may not happen again.
 
@@ -205,10 +216,9 @@ def conclude(
     found: Found, fitter: Fitter, without: Callable[[Fit, str], Fit], held: bool = False
 ) -> Diagnosis:
     """Return the diagnosis that a search has ``found``; ``without(fit, name)`` refits."""
-    end = _Conclusion(found, fitter, without)
+    end = Conclusion(found, fitter, without)
     judge, full = found.judge, fitter.full
-    doubtful = not end.is_small and end.explained < _TRUSTED_SHARE
-    others = end.first.model if doubtful else end.predicting(found.best, end.last)
+    others = end.for_others()
     first = stage_of(end.first, judge, fitter.raw)
     final = stage_of(
         end.last,
@@ -245,7 +255,7 @@ def conclude(
         simulations=fitter.work.simulations,
         interrupted=found.status == "stopped",
         held=held,
-        notes=tuple(_notes(end, doubtful, others, after, held)),
+        notes=tuple(_notes(end, others, after, held)),
         status=found.status,
         families=_families(end),
     )
@@ -255,7 +265,7 @@ def _label(member: str) -> str:
     return "slow drift of the reading" if member == DRIFT else member
 
 
-def _families(end: _Conclusion) -> tuple[tuple[str, float], ...]:
+def _families(end: Conclusion) -> tuple[tuple[str, float], ...]:
     """Return the probability of each family, largest first; they add up to 1."""
     found = end.judge.probabilities(list(end.found.fits.values()))
     if not end.is_small and not (end.found.best.members and end.explained > _TRUSTED_SHARE):
@@ -267,8 +277,7 @@ def _families(end: _Conclusion) -> tuple[tuple[str, float], ...]:
 
 
 def _notes(
-    end: _Conclusion,
-    doubtful: bool,
+    end: Conclusion,
     others: Actuator | Strip,
     after: Sequence[object],
     held: bool,
@@ -288,7 +297,7 @@ def _notes(
     gone = [name for name in end.found.best.effects if name not in kept]
     if DRIFT in end.found.best.members:
         gone.append("slow drift of the reading")
-    if gone and doubtful:
+    if gone and end.is_doubtful:
         said.append(
             "the effects found explain too little: other recordings are predicted without them"
         )

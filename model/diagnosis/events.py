@@ -98,7 +98,7 @@ def _as_it_is(problem: WhitenedProblem) -> Fit:
     costs, residuals = problem.evaluate(x[None])
     held = np.ones(x.size, dtype=bool)
     none = np.zeros((residuals.shape[1], 0))
-    return Fit(problem, x, held, float(costs[0]), residuals[0], none, converged=True)
+    return Fit(problem, x, held, float(costs[0]), residuals[0], none)
 
 
 def _with_events(fitter: Fitter, judge: Judge, best: Fit) -> Fit:

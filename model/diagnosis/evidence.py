@@ -111,12 +111,15 @@ class Judge:
         """Whether nothing is left that any effect could explain.
 
         The residual is white, or as coloured as the reading at rest, or so small a part of what is
-        explained that it may be the form of a law.
+        explained that it may be the form of a law. A branch at the shortest time of the search may
+        stand for an effect that is faster.
         """
         if not self.is_noise(fit):
             return False
         if not self._sensed(fit):
             return True
+        if fit.has_fastest_branch:
+            return False
         return self._is_like_rest(fit) or fit.cost - 1.0 < self.settings.form_share * (
             self.base_cost - fit.cost
         )

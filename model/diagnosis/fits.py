@@ -46,6 +46,7 @@ _NO_WEIGHT = 1e-6  # of the typical one: what the bounds of a descent leave of a
 _AT_ONCE = 1e-3  # s: a branch that relaxes faster than any record shows
 _BASELINE_STARTS = 5  # of the global search
 _BASELINE_ITERATIONS = 20
+_TO_THE_END = 200  # iterations, enough for the valley of two branches of nearly equal times
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,6 @@ class Fit:
     cost: float
     residuals: np.ndarray
     jacobian: np.ndarray
-    converged: bool = False
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -109,6 +109,13 @@ class Fit:
                 for q, value in zip(layout.quantities, values, strict=True)
             ]
         )
+
+    @property
+    def has_fastest_branch(self) -> bool:
+        """Whether a branch is as fast as the search allows: it stands for something faster."""
+        layout = self.problem.layout
+        times = layout.column("T")
+        return bool(np.any(np.isclose(self.x[times], layout.lower[times])))
 
     @cached_property
     def correlation(self) -> float:
@@ -358,14 +365,14 @@ class Fitter:
             problem = self.problem(problem.layout.base, fit.drift)
         gain = _gain(fit)
         found = descend_broyden(problem, fit.x, fit.fixed, None, 40, gain, True)
-        found = descend(problem, found.x, fit.fixed, 15, gain, 1e-3, 3, quick=True)
-        return replace(fit_of(problem, fit.fixed, found), converged=True)
+        found = descend(problem, found.x, fit.fixed, _TO_THE_END, gain, 1e-3, quick=True)
+        return fit_of(problem, fit.fixed, found)
 
     def careful(self, fit: Fit, iterations: int) -> Fit:
         """Return ``fit`` on every sample, with careful steps and two-sided differences."""
         problem = self.careful_problem(fit.model, fit.drift)
         found = descend(problem, fit.x, fit.fixed, iterations, _gain(fit), damping=1e-4)
-        return replace(fit_of(problem, fit.fixed, found), converged=True)
+        return fit_of(problem, fit.fixed, found)
 
     def careful_problem(
         self, model: Actuator | Strip, drift: float, layout: Layout | None = None
@@ -462,7 +469,7 @@ class Fitter:
             found, fixed = freed, none
         every = self.careful_problem(baseline.model, 0.0, layout)
         found = descend(every, found.x, fixed, iterations, gain, damping=1e-4)
-        fits.append(replace(fit_of(every, fixed, found), converged=True))
+        fits.append(fit_of(every, fixed, found))
         return min(fits, key=lambda f: f.cost)
 
     def _prepare(self, model: Actuator | Strip) -> None:
@@ -486,7 +493,7 @@ class Fitter:
             if is_worth_freeing(problem, found.cost, freed, int(fixed.sum())):
                 found, fixed = freed, free
         self._limits = fixed
-        return replace(fit_of(problem, fixed, found), converged=True)
+        return fit_of(problem, fixed, found)
 
 
 def _gain(fit: Fit) -> float:
@@ -501,6 +508,4 @@ def spring_count(layout: Layout) -> int:
 
 def fit_of(problem: WhitenedProblem, fixed: np.ndarray, found: LocalFit) -> Fit:
     """Return what a descent has ``found`` for ``problem``, with parameters ``fixed`` (d,)."""
-    return Fit(
-        problem, found.x, fixed, found.cost, found.residuals, found.jacobian, found.converged
-    )
+    return Fit(problem, found.x, fixed, found.cost, found.residuals, found.jacobian)

@@ -89,8 +89,8 @@ def _contending(
 def _leading(judge: Judge, runners: Sequence[Fit], effects: int, abreast: bool) -> list[Fit]:
     """Return the fits of the first ``effects`` sets of effects, and of families that leave noise.
 
-    Families that leave noise are told apart by converged fits alone. Unless ``abreast``, one fit of
-    each set.
+    Families that leave noise race to the end: only fits at the end of their valleys tell them
+    apart. Unless ``abreast``, one fit of each set.
     """
     ranked = judge.ranked(runners)
     sets = list(dict.fromkeys(fit.members for fit in ranked))

@@ -5,7 +5,8 @@ Run as ``python -m tests.benchmarks.bench_ablation [--first SEED] [--rigs N] [--
 by the whole method and by each method with one thing less. A row says for how many rigs the first
 effect was of a hidden family (or nothing was named where nothing is hidden), for how many the error
 on untouched recordings came within 15 % of what the truth itself would leave, for how many it got
-worse than the baseline's, and the processor time of a rig.
+worse than the baseline's, and the work of all searches in integration steps, over the whole
+method's. A fit that two variants make in the same way is made once.
 
 A rule earns its place if its row is worse than the first by more than chance: the last column is
 the probability of so large a difference in the number within the noise, either way, if the rule did
@@ -15,10 +16,10 @@ nothing (the sign test on the rigs that differ). Rigs that were looked at are no
 from __future__ import annotations
 
 import argparse
+import hashlib
 import math
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,12 +31,16 @@ from scipy.stats import binomtest
 
 from dearig.config.rigfile import RigFile
 from dearig.model.actuator import Actuator
-from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis import race as racing
+from dearig.model.diagnosis.conclusion import Conclusion
 from dearig.model.diagnosis.engine import Search
-from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.evidence import Judge, family_of
+from dearig.model.diagnosis.fits import Fit, Fitter
+from dearig.model.diagnosis.noise import WhitenedProblem
 from dearig.model.diagnosis.regression import Regression
 from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.diagnosis.shapes import Extent
+from dearig.model.effects import Effect
 from dearig.model.material import TABLE_3
 from dearig.model.records import ActuatorRecord
 from dearig.sim_backend.laser_noise import NOISES, WHITE
@@ -93,12 +98,104 @@ VARIANTS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """One rig under one variant; errors on untouched recordings over what the truth leaves."""
+    """One rig under one variant; errors on untouched recordings over what the truth leaves.
+
+    ``effort`` is the work of its search in integration steps, shared fits included.
+    """
 
     right: bool
     before: float
     after: float
-    seconds: float
+    effort: float
+
+
+class Shared:
+    """The variants of one rig: a fit that an earlier one made in the same way is not made again.
+
+    Which derivatives coarse drives give is asked once of each set of effects, so that a variant may
+    differ from a search of its own by what that was asked of.
+    """
+
+    def __init__(self, train: list[ActuatorRecord], base: Actuator) -> None:
+        self._fitter = Fitter(train, base, DiagnosisSettings(), workers=1)
+        self._baseline = self._fitter.baseline(lambda *_: None)
+        self._spent = self._fitter.work.effort
+        self._kept: dict[Any, tuple[Any, int, float]] = {}
+        for name in ("descend", "refined", "careful", "costs"):
+            setattr(self._fitter, name, self._once(name, getattr(self._fitter, name)))
+        self._fitter.baseline = lambda _: self._baseline  # type: ignore[method-assign]
+
+    def diagnosed(self, variant: Variant) -> tuple[Conclusion, float]:
+        """Return the conclusion of one variant, and its work."""
+        fitter = self._fitter
+        fitter.settings = replace(DiagnosisSettings(), **variant.settings)
+        fitter.work.simulations, fitter.work.effort = 0, self._spent
+        with variant.switch():
+            search = Search(fitter, lambda *_: None, lambda: False)
+            search._regression = self._regressed(search._regression)  # type: ignore[method-assign]
+            found = search.run()
+            effort = fitter.work.effort
+            return Conclusion(found, fitter, search.without), effort
+
+    def _once(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        work = self._fitter.work
+
+        def called(*given: Any, **options: Any) -> Any:
+            key = (name, *map(_key, given), *((k, _key(v)) for k, v in sorted(options.items())))
+            if key in self._kept:
+                result, simulations, effort = self._kept[key]
+                self._fitter._count(simulations, effort)
+                return result
+            simulations, effort = work.simulations, work.effort
+            result = call(*given, **options)
+            self._kept[key] = result, work.simulations - simulations, work.effort - effort
+            return result
+
+        return called
+
+    def _regressed(self, call: Callable[..., Any]) -> Callable[..., Any]:
+        """Return the regression of a parent, its starts found once for the same settings."""
+        used = replace(self._fitter.settings, **dict.fromkeys(_NOT_OF_REGRESSION, 0))
+
+        def called(parent: Any) -> Any:
+            key = ("regression", used, Regression._sharpened, _key(parent))
+            if key not in self._kept:
+                regression, extent = call(parent)
+                found: dict[Any, Any] = {}
+                whole = regression.starts
+
+                def starts(effects: Sequence[Effect], extent: Extent) -> Any:
+                    names = tuple(e.name for e in effects)
+                    if names not in found:
+                        found[names] = whole(effects, extent)
+                    return found[names]
+
+                regression.starts = starts
+                self._kept[key] = (regression, extent), 0, 0.0
+            return self._kept[key][0]
+
+        return called
+
+
+#: Settings that the regression does not use.
+_NOT_OF_REGRESSION = (
+    "effort", "pairs", "effects_max", "odds", "unnamed_odds", "form_error", "form_share",
+    "noise_margin", "white_correlation", "tempering",
+)  # fmt: skip
+
+
+def _key(given: Any) -> Any:
+    """Return what tells one argument of a fit from another."""
+    if isinstance(given, np.ndarray):
+        return hashlib.sha256(np.ascontiguousarray(given).tobytes()).digest()
+    if isinstance(given, WhitenedProblem):
+        drift = given.noise_drift.amplitude if given.noise_drift else 0.0
+        layout = given.layout
+        bounds = (_key(layout.lower), _key(layout.upper))
+        return repr(layout.base), bounds, drift, given.fidelity, given.samples
+    if isinstance(given, Fit):
+        return _key(given.problem), _key(given.x), _key(given.fixed)
+    return given
 
 
 def main() -> None:
@@ -135,21 +232,17 @@ def _played(
     train, others = (records_of(paths) for paths in bench.record(case, folder))
     least = math.hypot(bench.floor_um(case.noise), bench.own_um(case)) * 1e-6
     rig = RigFile()
-    base = Actuator(rig.as_film(), rig.as_load(), TABLE_3)
+    shared = Shared(train, Actuator(rig.as_film(), rig.as_load(), TABLE_3))
     families = set(case.truth.families)
     for variant in variants:
-        settings = replace(DiagnosisSettings(), **variant.settings)
-        began = time.process_time()
-        with variant.switch():
-            diagnosis = diagnose(train, base, workers=1, settings=settings)
-        seconds = time.process_time() - began
-        named = [step.family for step in diagnosis.steps]
-        right = named[0] in families if named else not families
-        models = (diagnosis.baseline.model, diagnosis.final.predicting)
+        end, effort = shared.diagnosed(variant)
+        order = end.order()
+        right = family_of(order[0]) in families if order else not families
+        models = (end.first.model, end.for_others())
         before, after = (
             _error(model, others) / least for model in models if isinstance(model, Actuator)
         )
-        yield variant.name, Outcome(right, before, after, seconds)
+        yield variant.name, Outcome(right, before, after, effort)
 
 
 def _error(model: Actuator, records: list[ActuatorRecord]) -> float:
@@ -169,7 +262,7 @@ def _told(found: Mapping[str, list[Outcome]]) -> str:
 
 
 def _table(found: Mapping[str, list[Outcome]]) -> str:
-    heads = ("variant", "named right", "within 15 %", "worse", "CPU s", "by chance")
+    heads = ("variant", "named right", "within 15 %", "worse", "work", "by chance")
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     whole = [o.after <= WITHIN for o in found["whole"]]
     for name, rows in found.items():
@@ -182,7 +275,7 @@ def _table(found: Mapping[str, list[Outcome]]) -> str:
             f"{sum(o.right for o in rows)}/{len(rows)}",
             f"{sum(within)}/{len(rows)} (+{gained} -{lost})",
             str(sum(o.after > 1.001 * o.before for o in rows)),
-            f"{np.median([o.seconds for o in rows]):.1f}",
+            f"{sum(o.effort for o in rows) / sum(o.effort for o in found['whole']):.2f}",
             f"{chance:.2f}",
         )
         lines.append("| " + " | ".join(cells) + " |")

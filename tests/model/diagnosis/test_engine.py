@@ -69,6 +69,18 @@ def test_the_baseline_is_as_good_as_that_of_an_identification() -> None:
     assert fitter.identified(searched, 8).cost < 1.002 * fitted.cost < 0.9 * searched.cost
 
 
+def test_the_baseline_follows_the_valley_of_two_branches_of_nearly_equal_times() -> None:
+    network = Network.gent((37e3, 43e3, 64e3, 9e3), (1e4,) * 4, (1.0, 0.6, 5.0))
+    truth = replace(PLAIN, network=network)
+    start = replace(PLAIN, network=Network.gent((45e3,) * 4, (1e4,) * 4, (0.3, 1.0, 4.0)))
+    fitter = Fitter([record_of(truth)], start, DiagnosisSettings(), workers=1)
+    searched = fitter.baseline(lambda *_: None)
+    problem = fitter.problem(truth)
+    costs, _ = problem.evaluate(problem.layout.coordinates(problem.layout.initial())[None])
+    # odds of a further effect are not to be had from springs that are not fitted
+    assert (searched.cost - costs[0]) * problem.samples < 2.0
+
+
 def test_a_form_that_no_law_with_a_name_has_is_found_by_the_general_law() -> None:
     # a reading that gains 24 um at two places of the travel
     steps = {f"error_{i}": 24e-6 if i in (2, 5) else 0.0 for i in range(1, 9)}
