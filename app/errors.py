@@ -25,6 +25,17 @@ class DearigError(Exception):
     exit_code = 1
     output_state: OutputState | None = None
 
+    @property
+    def needs_inspection(self) -> bool:
+        """Whether a person must look at the rig before it is used again.
+
+        True where an interlock or a fault ended a run, and where 0 V is not confirmed after it;
+        False where no rig was contacted.
+        """
+        if self.output_state is None:
+            return isinstance(self, NotSafe)
+        return isinstance(self, SafetyStop | InstrumentFault) or not self.output_state.confirmed
+
 
 class InputError(DearigError):
     """Wrong input or usage; nothing was changed."""

@@ -13,7 +13,7 @@ from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.reader import open_recording
 
-__all__ = ["Cycle", "Loops", "cycles", "loop_area", "loops", "loops_of", "valleys"]
+__all__ = ["Cycle", "Loops", "cycle_edges", "cycles", "loop_area", "loops", "loops_of", "valleys"]
 
 #: Depth of a valley of the drive that divides two cycles, as a part of the range of the drive:
 #: ripple and noise of a voltage are below it, lobes of a sequence above it.
@@ -77,6 +77,16 @@ def cycles(drive: np.ndarray) -> list[tuple[int, int]]:
         for first, last in pairwise(valleys(drive))
         if abs(known[last] - known[first]) < _VALLEY * span
     ]
+
+
+def cycle_edges(drive: np.ndarray) -> list[int]:
+    """Return the rows at which the cycles of ``drive`` (n,) begin, and the last one's end.
+
+    They are its ``valleys``, so that every part of the drive belongs to a cycle; a drive that only
+    rises is one cycle. Empty for a drive that does not vary.
+    """
+    edges = valleys(drive)
+    return [*edges, drive.size - 1] if len(edges) == 1 else edges
 
 
 def valleys(drive: np.ndarray) -> list[int]:

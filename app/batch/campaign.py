@@ -43,9 +43,7 @@ from dearig.errors import (
     DearigError,
     DiskFault,
     InputError,
-    InstrumentFault,
     Interrupted,
-    NotSafe,
     SafetyStop,
 )
 from dearig.output_state import Known, OutputState
@@ -495,9 +493,9 @@ class _Session:
             self.note("not-started", run=state.name, reason=str(error))
             reason = f"run {state.name}: {error}"
             return "refused", reason, InputError(reason)
-        output = self._output = error.output_state
-        doubt = output is None or not output.confirmed
-        looks = isinstance(error, SafetyStop | InstrumentFault | NotSafe) or doubt
+        self._output = error.output_state
+        # nobody was there: what kept a run from its rig would keep the next one from it too
+        looks = error.needs_inspection or error.output_state is None
         if looks:
             self._halt(f"run {state.name}: {error}")
         if not path.exists():

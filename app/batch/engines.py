@@ -60,13 +60,18 @@ class Engine(Protocol):
         """Yield each task with its row, in the order in which they end."""
 
 
-def engine_at(where: str, workers: int | None = None) -> Engine:
-    """Return the engine that ``--on`` names: local, or dask:ADDRESS. Raises ``InputError``."""
+def engine_at(
+    where: str, workers: int | None = None, work: Callable[[Task], Row] | None = None
+) -> Engine:
+    """Return the engine that ``--on`` names: local, or dask:ADDRESS. Raises ``InputError``.
+
+    ``work`` computes a task; by default it is ``fit_task``.
+    """
     if where == "local":
-        return LocalEngine(workers)
+        return LocalEngine(workers, work)
     scheme, colon, address = where.partition(":")
     if scheme == "dask" and colon and address:
-        return DaskEngine(address)
+        return DaskEngine(address, work)
     raise InputError(
         f"--on {where!r} is not known: write local, or dask:ADDRESS with the address of a Dask "
         f"scheduler, such as dask:tcp://10.0.0.5:8786"
@@ -181,11 +186,13 @@ def _lost(task: Task) -> Row:
 class DaskEngine:
     """The workers of the Dask scheduler at ``address``, each with this version of the program.
 
-    A recording is sent to the worker that computes it, so that the workers need no common disk.
+    The recordings of a task are sent to the worker that computes it, so that the workers need no
+    common disk.
     Raises ``InputError`` where Dask is not installed, or no scheduler answers.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, work: Callable[[Task], Row] | None = None) -> None:
+        self._work = work or _fit_task()
         self._dask = import_extra("distributed", "cluster", "--on dask:ADDRESS")
         self._address = address
         self._client = self._connect()
@@ -258,12 +265,11 @@ class DaskEngine:
     def _submit(self, client: Any, task: Task) -> Any:
         from dearig.batch.fits import code_digest, fit_sent
 
-        contents = [
-            (path.name, path.read_bytes())
-            for path in (task.path, journal_of(task.path))
-            if path.is_file()
+        sent = [
+            (name, [(p.name, p.read_bytes()) for p in (path, journal_of(path)) if p.is_file()])
+            for name, path in task.recordings
         ]
         return client.submit(
-            fit_sent, task.name, contents, task.options, code_digest(), key=f"dearig-{task.key}",
-            pure=False, retries=_RETRIES,
+            fit_sent, self._work, (task.name, task.key, task.options), sent, code_digest(),
+            key=f"dearig-{task.key}", pure=False, retries=_RETRIES,
         )  # fmt: skip

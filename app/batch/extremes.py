@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.analysis.loops import valleys
+from dearig.analysis.loops import cycle_edges
 from dearig.errors import InputError
 from dearig.recording.files import write_whole
 from dearig.recording.reader import open_recording
@@ -44,9 +44,7 @@ def write_extremes(recording: Path, out: Path, every: int = 0) -> int:
     present = [column for column in _COLUMNS if column[0] in opened.arrays.names]
     values = [opened.arrays.read(name) * factor for name, factor, _ in present]
     names = [(name, unit) for name, _, unit in present]
-    edges = valleys(command)
-    if len(edges) == 1:  # a run that was cut off on its first way up
-        edges.append(command.size - 1)
+    edges = cycle_edges(command)
     starts = np.array(edges[:-1], dtype=np.int64)
     if every:
         head = ["cycle", "time_s", *(f"{name}_{unit}" for name, unit in names)]

@@ -12,7 +12,7 @@ import logging
 import math
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import import_module, metadata
@@ -24,6 +24,7 @@ import numpy as np
 import dearig
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
+from dearig.analysis.loops import cycle_edges
 from dearig.analysis.validate import validate_model
 from dearig.batch.numbers import errors_of, parameters_of
 from dearig.config.modelfile import load_model
@@ -85,12 +86,21 @@ class StudyOptions:
 
 @dataclass(frozen=True)
 class Task:
-    """One recording of a study: its ``name`` in the table, its file, and the key of its row."""
+    """One recording of a study: its ``name`` in the table, its file, and the key of its row.
+
+    ``members`` are names and files of the recordings of the film ``name`` that are fitted together.
+    """
 
     name: str
     path: Path
     key: str
     options: StudyOptions
+    members: tuple[tuple[str, Path], ...] = ()
+
+    @property
+    def recordings(self) -> tuple[tuple[str, Path], ...]:
+        """Names and files of the recordings of this task."""
+        return self.members or ((self.name, self.path),)
 
 
 @cache
@@ -122,31 +132,13 @@ def key_of(path: Path, name: str, options: StudyOptions) -> str:
 
 def fit_task(task: Task, progress: Progress = quiet) -> Row:
     """Return the row of ``task``; what is wrong with its recording is in the row."""
-    return _row(task.path, task.name, task.options, progress)
-
-
-def fit_sent(
-    name: str, contents: Sequence[tuple[str, bytes]], options: StudyOptions, digest: str
-) -> Row:
-    """Return the row of a recording that was sent with its journal, as names and contents.
-
-    ``digest`` is the sender's ``code_digest``; raises ``OtherVersion`` where it differs.
-    """
-    if digest != code_digest():
-        raise OtherVersion("a worker has another version of dearig or of its libraries")
-    with tempfile.TemporaryDirectory(prefix="dearig-study-") as folder:
-        for file, content in contents:
-            Path(folder, file).write_bytes(content)
-        return _row(Path(folder, contents[0][0]), name, options, quiet)
-
-
-def _row(path: Path, name: str, options: StudyOptions, progress: Progress) -> Row:
+    name, path = task.name, task.path
     row: Row = {"recording": name, "state": "failed", "reason": ""}
     with ONE_AT_A_TIME:
         try:
             recording = open_recording(path)
             row |= about(recording)
-            row |= _computed(recording, options, progress)
+            row |= _computed(recording, task.options, progress)
             row["state"] = "ok"
         except InputError as error:
             row["reason"] = str(error).replace(str(path), name)
@@ -156,6 +148,32 @@ def _row(path: Path, name: str, options: StudyOptions, progress: Progress) -> Ro
             # without a checksum: such a row is not kept
             return {"recording": name, "state": "failed", "reason": f"{name}: {reason}"}
     return row
+
+
+def fit_sent(
+    work: Callable[[Task], Row],
+    task: tuple[str, str, StudyOptions],
+    sent: Sequence[tuple[str, Sequence[tuple[str, bytes]]]],
+    digest: str,
+) -> Row:
+    """Return what ``work`` gives of a task whose recordings were sent.
+
+    ``task`` is its name, key and options; ``sent`` has the name of each recording, and its file and
+    journal as names and contents. ``digest`` is the sender's ``code_digest``; raises
+    ``OtherVersion`` where it differs.
+    """
+    if digest != code_digest():
+        raise OtherVersion("a worker has another version of dearig or of its libraries")
+    name, key, options = task
+    with tempfile.TemporaryDirectory(prefix="dearig-study-") as folder:
+        members = []
+        for i, (recording, files) in enumerate(sent):
+            place = Path(folder, str(i))
+            place.mkdir()
+            for file, content in files:
+                (place / file).write_bytes(content)
+            members.append((recording, place / files[0][0]))
+        return work(Task(name, members[0][1], key, options, tuple(members)))
 
 
 def about(recording: Recording) -> Row:
@@ -179,12 +197,9 @@ def about(recording: Recording) -> Row:
 
 
 def _cycles(recording: Recording) -> int | None:
-    """Return how often the commanded voltage rises above half of its peak; None for a film."""
+    """Return the number of cycles of the commanded voltage, valley to valley; None for a film."""
     voltage = recording.voltage_command
-    if voltage is None or not voltage.size:
-        return None
-    high = np.abs(voltage) > 0.5 * np.nanmax(np.abs(voltage))
-    return int(np.count_nonzero(high[1:] & ~high[:-1]) + high[0])
+    return None if voltage is None else max(len(cycle_edges(voltage)) - 1, 0)
 
 
 def _peaks(recording: Recording) -> Row:

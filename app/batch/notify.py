@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 from dearig.acquisition.run import RunResult
 from dearig.batch.queue import DONE, LOST, STOPPED, RunState
 from dearig.config.notify import Event, Notify, redacted
-from dearig.errors import DearigError, InstrumentFault, SafetyStop
+from dearig.errors import DearigError, SafetyStop
 from dearig.output_state import OutputState
 from dearig.recording.files import one_line
 from dearig.recording.layout import iso_time
@@ -168,9 +168,8 @@ class Notifier:
             output = error.output_state
             if output is not None:
                 stopped = isinstance(error, SafetyStop)
-                looks = stopped or isinstance(error, InstrumentFault) or not output.confirmed
                 self.tell(
-                    "tripped" if looks else "run-ended",
+                    "tripped" if error.needs_inspection else "run-ended",
                     f"Run {path.stem}: {error}",
                     run=_of_run(
                         path.stem, STOPPED if stopped else LOST, str(path), str(error), output

@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dearig.analysis.shared import identify_shared
@@ -21,24 +19,17 @@ from dearig.recording.recording import Recording
 if TYPE_CHECKING:
     from dearig.batch.studies import Subject
 
-__all__ = ["FilmTask", "film_task", "fit_film", "rows_of"]
+__all__ = ["film_task", "fit_film", "rows_of"]
 
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class FilmTask(Task):
-    """The recordings of the film ``name``: ``members`` are their names and files."""
-
-    members: tuple[tuple[str, Path], ...]
-
-
-def film_task(film: str, members: Sequence[tuple[Subject, str]], options: StudyOptions) -> FilmTask:
+def film_task(film: str, members: Sequence[tuple[Subject, str]], options: StudyOptions) -> Task:
     """Return the task of ``film``; ``members`` are its recordings with the keys of their rows."""
     ordered = sorted(members, key=lambda member: member[0].name)
     digest = hashlib.sha256("\n".join(key for _, key in ordered).encode()).hexdigest()
     named = tuple((subject.name, subject.path) for subject, _ in ordered)
-    return FilmTask(film, named[0][1], digest, options, named)
+    return Task(film, named[0][1], digest, options, named)
 
 
 def fit_film(task: Task, progress: Progress = quiet) -> Row:
@@ -46,12 +37,10 @@ def fit_film(task: Task, progress: Progress = quiet) -> Row:
 
     Where the others cannot be fitted together either, no recording has a result.
     """
-    if not isinstance(task, FilmTask):
-        raise TypeError(f"{task.name} is no task of a film")
     rows: dict[str, Row] = {}
     good: list[tuple[str, Recording]] = []
     with ONE_AT_A_TIME:
-        for name, path in task.members:
+        for name, path in task.recordings:
             row: Row = {"recording": name, "state": "failed", "reason": ""}
             try:
                 recording = open_recording(path)
@@ -104,12 +93,12 @@ def _fit(
         }
 
 
-def rows_of(task: FilmTask, found: Row) -> dict[str, Row]:
+def rows_of(task: Task, found: Row) -> dict[str, Row]:
     """Return the rows of the recordings of ``task`` by their names, from what it gave."""
     if "rows" not in found:
         # its process died
         return {
             name: {"recording": name, "state": "failed", "reason": found["reason"]}
-            for name, _ in task.members
+            for name, _ in task.recordings
         }
     return {row["recording"]: row for row in found["rows"]}

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from dearig.batch.engines import ClusterLost, Engine, LocalEngine
-from dearig.batch.fits import KINDS, Row, StudyOptions, Task, key_of
+from dearig.batch.fits import KINDS, Row, StudyOptions, Task, fit_task, key_of
 from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import Queue
 from dearig.batch.shared_fits import film_task, fit_film, rows_of
@@ -187,14 +187,7 @@ def study_recordings(
         else:
             tasks.append(task)
     cached = len(subjects) - len(tasks) - unreadable
-    moved = ""
-    try:
-        _compute(tasks, engine, rows, cache, len(subjects), progress)
-    except ClusterLost as error:
-        moved = f"the cluster was lost ({error}); the rest was computed on this computer"
-        log.warning("%s", moved)
-        rest = [task for task in tasks if task.name not in rows]
-        _compute(rest, LocalEngine(), rows, cache, len(subjects), progress)
+    moved = _compute_all(tasks, engine, fit_task, rows, cache, len(subjects), progress)
     return _table(subjects, rows, options, out, cached, moved)
 
 
@@ -202,15 +195,15 @@ def study_films(
     subjects: Sequence[Subject],
     options: StudyOptions,
     out: Path,
-    workers: int | None = None,
+    engine: Engine,
     *,
     progress: Progress = quiet,
 ) -> StudyTable:
     """Fit the recordings of each film together, and write their rows to ``out``.
 
-    The parameters ``options.own`` each recording has for itself, the others are of the film. Films
-    are fitted in so many processes of this computer, and cached as ``study_recordings`` does it. A
-    recording without the name of a film has no result.
+    The parameters ``options.own`` each recording has for itself, the others are of the film.
+    ``engine`` computes films by ``fit_film``; they are cached, and a lost cluster is replaced, as
+    ``study_recordings`` does it. A recording without the name of a film has no result.
     """
     cache = _cache_in(out)
     rows: dict[str, Row] = {}
@@ -236,10 +229,10 @@ def study_films(
             found[task.name] = known
     cached = sum(len(found[task.name]["rows"]) for task in tasks if task.name in found)
     rest = [task for task in tasks if task.name not in found]
-    _compute(rest, LocalEngine(workers, fit_film), found, cache, max(len(tasks), 1), progress)
+    moved = _compute_all(rest, engine, fit_film, found, cache, max(len(tasks), 1), progress)
     for task in tasks:
         rows |= rows_of(task, found[task.name])
-    return _table(subjects, rows, options, out, cached, "")
+    return _table(subjects, rows, options, out, cached, moved)
 
 
 def _table(
@@ -271,6 +264,27 @@ def _cache_in(out: Path) -> Path:
 def _unreadable(subject: Subject, error: OSError) -> Row:
     reason = f"{subject.name} cannot be read: {in_words(error)}"
     return {"recording": subject.name, "state": "failed", "reason": reason}
+
+
+def _compute_all(
+    tasks: Sequence[Task],
+    engine: Engine,
+    work: Callable[[Task], Row],
+    rows: dict[str, Row],
+    cache: Path,
+    total: int,
+    progress: Progress,
+) -> str:
+    """Compute ``tasks``, those left by a lost cluster by ``work`` here; return a sentence on it."""
+    try:
+        _compute(tasks, engine, rows, cache, total, progress)
+    except ClusterLost as error:
+        moved = f"the cluster was lost ({error}); the rest was computed on this computer"
+        log.warning("%s", moved)
+        rest = [task for task in tasks if task.name not in rows]
+        _compute(rest, LocalEngine(work=work), rows, cache, total, progress)
+        return moved
+    return ""
 
 
 def _compute(

@@ -18,7 +18,7 @@ from dearig.cli.options import (
     SpringKind,
 )
 from dearig.cli.output import check_files, print_line, working, write_result
-from dearig.errors import InputError, Interrupted
+from dearig.errors import Interrupted
 
 __all__ = ["commands"]
 
@@ -94,7 +94,8 @@ def study(
     ended goes on where it stood. Ctrl-C ends it.
     """  # fmt: skip
     from dearig.batch.engines import engine_at
-    from dearig.batch.fits import StudyOptions
+    from dearig.batch.fits import StudyOptions, fit_task
+    from dearig.batch.shared_fits import fit_film
     from dearig.batch.studies import study_films, study_recordings, subjects_of, with_model
     from dearig.cli.terminal import study_rows
     from dearig.report.study_table import study_table_json
@@ -107,16 +108,12 @@ def study(
         ),
         model,
     )  # fmt: skip
-    if own and on != "local":
-        raise InputError("--own fits the recordings of a film on this computer: leave --on out")
     subjects = subjects_of(sources, out)
-    engine = engine_at(on, workers)
+    engine = engine_at(on, workers, fit_film if own else fit_task)
     with working(json) as (console, progress):
         try:
-            if own:
-                table = study_films(subjects, options, out, workers, progress=progress)
-            else:
-                table = study_recordings(subjects, options, out, engine, progress=progress)
+            study = study_films if own else study_recordings
+            table = study(subjects, options, out, engine, progress=progress)
         except KeyboardInterrupt:
             raise Interrupted(
                 f"interrupted: the rows that were computed are kept in {out}; the same command "

@@ -17,7 +17,7 @@ from dearig.batch.queue import CampaignOutcome
 from dearig.config.campaignfile import Campaign
 from dearig.config.rigfile import RigFile
 from dearig.drivers.rig import Block, Event, RigIdentity
-from dearig.errors import DearigError, InstrumentFault, NotSafe, SafetyStop
+from dearig.errors import DearigError
 from dearig.output_state import Known, OutputState
 from dearig.window.campaign_compute import ComputeApart
 from dearig.window.live import Live
@@ -127,10 +127,8 @@ class CampaignThread(PlayThread):
             if outcome.status == "interrupted":
                 sentence = _left(outcome)
         output = error.output_state or self.output
-        fault = isinstance(error, SafetyStop | InstrumentFault) and error.output_state is not None
-        alarming = (
-            fault or isinstance(error, NotSafe) or (output is not None and not output.confirmed)
-        )
+        # an error between two runs says nothing of the output after the last one
+        alarming = error.needs_inspection or (output is not None and not output.confirmed)
         return RunEnd(headline, sentence, None, output, alarming=alarming, play=Play.CAMPAIGN)
 
 

@@ -319,8 +319,7 @@ class _RunThread(PlayThread):
                 clock=time.monotonic, feedback=order.feedback,
             )  # fmt: skip
         except DearigError as error:
-            played = self._live.now() is not None
-            self.end = _early_end(error, out, played)
+            self.end = _early_end(error, out)
         except BaseException:
             # an error of the program may leave a voltage
             known = observer.output_state or OutputState(Known.UNKNOWN, time.time())
@@ -338,14 +337,14 @@ class _RunThread(PlayThread):
             )
 
 
-def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
-    """Describe a run that ended early; ``played`` is True where its rig was ready to start."""
+def _early_end(error: DearigError, out: Path) -> RunEnd:
+    """Describe a run that ended early."""
     headline = headline_of(error)
     sentence = str(error).removeprefix("interrupted: ")
-    output = error.output_state
-    fault = played and isinstance(error, SafetyStop | InstrumentFault)
-    alarming = fault or (output is not None and not output.confirmed)
-    return RunEnd(headline, sentence, out if out.exists() else None, output, alarming=alarming)
+    return RunEnd(
+        headline, sentence, out if out.exists() else None, error.output_state,
+        alarming=error.needs_inspection,
+    )  # fmt: skip
 
 
 def next_recording_path(folder: Path, name: str) -> Path:

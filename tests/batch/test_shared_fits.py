@@ -9,13 +9,14 @@ import pytest
 
 from dearig.analysis.shared import SharedOutcome, identify_shared
 from dearig.batch import shared_fits
+from dearig.batch.engines import LocalEngine, engine_at
 from dearig.batch.fits import StudyOptions
+from dearig.batch.shared_fits import fit_film
 from dearig.batch.studies import StudyTable, study_films, subjects_of, with_model
 from dearig.drivers.rig import Block
 from dearig.errors import InputError
 from dearig.model.fitting import Estimate
 from dearig.recording.recording import Recording
-from tests.tools.command import dearig, refused
 from tests.tools.recordings import run_counts, writer
 
 FILMS = {"a.h5": "F1", "b.h5": "F1", "c.h5": "F2", "d.h5": ""}
@@ -60,7 +61,9 @@ def fitted(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 @pytest.fixture
 def table(shelf: Path, tmp_path: Path) -> Callable[[], StudyTable]:
     def study() -> StudyTable:
-        return study_films(subjects_of([shelf], tmp_path), OPTIONS, tmp_path, 1)
+        return study_films(
+            subjects_of([shelf], tmp_path), OPTIONS, tmp_path, LocalEngine(1, fit_film)
+        )
 
     return study
 
@@ -87,11 +90,20 @@ def test_recordings_are_fitted_with_those_of_their_film_and_computed_once(
 def test_other_options_of_the_fit_do_not_share_parameters(shelf: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--own is of --do identify"):
         with_model(StudyOptions("diagnose", own=("mu_0",)), None)
-    answer = dearig(
-        "study", shelf, "--do", "identify", "--own", "mu_0", "--on", "dask:tcp://127.0.0.1:1",
-        "--out", tmp_path,
-    )  # fmt: skip
-    refused(answer, "leave --on out")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_films_are_fitted_on_a_cluster_as_here(
+    shelf: Path, fitted: list[list[str]], table: Callable[[], StudyTable], tmp_path: Path
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        engine = engine_at(f"dask:{cluster.scheduler_address}", work=fit_film)
+        there = study_films(subjects_of([shelf], tmp_path / "d"), OPTIONS, tmp_path / "d", engine)
+    assert sorted(fitted) == [["a.h5", "b.h5"], ["c.h5"]]
+    assert there.table.read_bytes() == table().table.read_bytes()
 
 
 def test_a_parameter_that_the_model_lacks_is_named(shelf: Path) -> None:

@@ -11,13 +11,18 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
 from dearig.batch.engines import ClusterLost, DaskEngine, LocalEngine, engine_at
-from dearig.batch.fits import StudyOptions, fit_task, key_of
+from dearig.batch.extremes import write_extremes
+from dearig.batch.fits import StudyOptions, about, fit_task, key_of
 from dearig.batch.studies import study_recordings, subjects_of, with_model
 from dearig.errors import InputError
+from dearig.recording import RunMetadata
+from dearig.recording.reader import open_recording
+from dearig.recording.save import save_recording
 from tests.tools.command import dearig, done, names, refused, thesis_model
 from tests.tools.played import Bench
 from tests.tools.recordings import run_counts, write_run
@@ -87,6 +92,16 @@ def test_a_broken_recording_costs_its_row_and_nothing_is_computed_twice(
     assert table(replace(options, drive="monitor")).cached == 0
 
 
+def test_cycles_of_a_study_are_those_of_a_lifetime_test(tmp_path: Path) -> None:
+    """Also about a bias, where the voltage never falls below half of its peak."""
+    voltage = np.r_[np.zeros(30), 4e3 - 1e3 * np.cos(2.0 * np.pi * np.arange(301) / 20), 0.0]
+    values = {"time": np.arange(voltage.size) / 100.0, "voltage_command": voltage,
+              "displacement": voltage * 1e-7}  # fmt: skip
+    path = save_recording(tmp_path / "run.h5", "actuator", values, RunMetadata())
+    assert about(open_recording(path))["cycles"] == 15
+    assert write_extremes(path, tmp_path / "run.csv") == 15
+
+
 def test_the_key_of_a_row_is_of_content_options_and_name(
     shelf: Path, options: StudyOptions, tmp_path: Path
 ) -> None:
@@ -142,7 +157,7 @@ def test_a_lost_cluster_leaves_the_rest_to_this_computer(
             yield tasks[0], fit_task(tasks[0])
             raise ClusterLost("the scheduler does not answer")
 
-    monkeypatch.setattr("dearig.batch.studies.LocalEngine", lambda: LocalEngine(1))
+    monkeypatch.setattr("dearig.batch.studies.LocalEngine", lambda work: LocalEngine(1, work))
     subjects = subjects_of([shelf / "recordings"], tmp_path)
     table = study_recordings(subjects, options, tmp_path / "lost", Lost())
     whole = study_recordings(subjects, options, tmp_path / "whole", LocalEngine(1))
