@@ -25,7 +25,16 @@ from dearig.config.targetfile import LoadedTarget
 from dearig.drivers.gate import Margin
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
-from dearig.model.control import Inversion, Learner, TrackingTask, invert, mean_without_outliers
+from dearig.model.control import (
+    Inversion,
+    Learner,
+    LearningSettings,
+    TrackingTask,
+    invert,
+    lines_at_rest,
+    mean_without_outliers,
+    reading_under,
+)
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Sampled, Sequence
 from dearig.model.fitting.parameters import NORMAL_95, Layout
@@ -141,7 +150,8 @@ class TrackedRun(_Named):
     ``kind`` is one of ``KINDS``, ``iteration`` counts from 0. ``rms`` and ``largest`` in m are of
     reference minus measured, over the ``samples`` that the film can reach and that were usable;
     NaN where there are none. ``recording`` is the file, ``margins`` those of the gate. ``time``,
-    ``measured`` (NaN where unusable), ``predicted`` and ``voltage`` are (N,) in SI units.
+    ``measured`` (NaN where unusable, without the interference that is there at rest too),
+    ``predicted`` and ``voltage`` are (N,) in SI units.
     ``noise`` in m is the standard deviation of a reading at rest.
     ``edge`` in Hz is up to where the next run learned from this one, 0 where it did not.
     """
@@ -204,7 +214,10 @@ class Tracking:
     iterations : int or None
         Runs that learn from the one before; None proposes one after another.
     compare : ModelFile, optional
-        The voltages of a linear map and of this model are proposed before.
+        The voltages of a linear map and of this model are proposed before. Where it predicts its
+        own run significantly better than ``model`` does, it is followed in place of ``model``: a
+        model is falsified by data that were recorded under another voltage, before it is used (M.
+        G. Safonov and T.-C. Tsao, IEEE Trans. Automatic Control 42, 843 (1997)).
     within : float
         Distance in m from the target that is accepted.
 
@@ -234,6 +247,8 @@ class Tracking:
         within: float = WITHIN,
     ) -> None:
         self.target, self.model, self.within = target, model, within
+        self._followed = model
+        self._compare = compare
         ours = _actuator(model, "--model")
         self.task = task_of(target, rig_file)
         self._iterations = iterations
@@ -269,6 +284,8 @@ class Tracking:
                 f"voltage was computed: nothing is learned from it; compute the voltage again"
             )
         run = self._measured(played, recording, margins)
+        if played.kind == "thesis":
+            run = replace(run, notes=(*run.notes, *self._chosen_by(run, played)))
         if played.kind in ("model", "learned"):
             last = played.iteration == self._iterations
             try:
@@ -282,7 +299,7 @@ class Tracking:
                 samples=lesson.samples,
                 edge=0.0 if last else lesson.edge,
                 contraction=math.nan if last else lesson.contraction,
-                notes=lesson.notes,
+                notes=(*run.notes, *lesson.notes),
             )
         self.runs = (*self.runs, run)
         self.proposed = self._next()
@@ -310,7 +327,7 @@ class Tracking:
             return None
         kind = "learned" if iteration else "model"
         learner = self._learner
-        return self._proposal(kind, learner.voltage, learner.expected, self.model, iteration)
+        return self._proposal(kind, learner.voltage, learner.expected, self._followed, iteration)
 
     def _proposal(
         self,
@@ -333,6 +350,34 @@ class Tracking:
             self._proposal("thesis", found.voltage, found.reading, compare),
         ]
 
+    def _chosen_by(self, run: TrackedRun, played: Proposal) -> tuple[str, ...]:
+        """Follow the compared model if its run speaks against the model; return what is said.
+
+        The difference of the mean squares of both predictions' errors counts from so many standard
+        errors on as learning asks for: with noise n it is that of 2 (difference of both) n.
+        """
+        theirs, expected = self._compare, played.expected
+        if theirs is None or expected is None:
+            return ()
+        found = reading_under(_actuator(self.model, "--model"), self.task, played.voltage)
+        known = self.inversion.reachable & np.isfinite(run.measured)
+        apart = (found - expected)[known]
+        mine, other = ((run.measured - row)[known] for row in (found, expected))
+        scatter = 2.0 * run.noise * float(np.sqrt(np.sum(apart**2)))
+        worse = float(np.sum(mine**2) - np.sum(other**2))
+        stands = bool(np.isfinite(found).all())
+        if stands and worse <= LearningSettings().significant * scatter:
+            return ()
+        task = replace(self.task, target=self.inversion.reference)
+        model = _actuator(theirs, "--compare")
+        self._learner = Learner(model, task, alternatives=alternatives_of(theirs))
+        self._followed = theirs
+        off, less = (float(np.sqrt(np.mean(row**2))) * 1e6 for row in (mine, other))
+        return (
+            f"the model {self.model.name!r} predicts this run with an error of {off:.3g} um, the "
+            f"compared one with {less:.3g} um: the compared model is followed",
+        )
+
     def _measured(
         self, played: Proposal, recording: Recording, margins: tuple[Margin, ...]
     ) -> TrackedRun:
@@ -346,6 +391,16 @@ class Tracking:
         noise = _noise(recording)
         zero = mean_without_outliers(reading[:n][rest], noise) if rest.any() else 0.0
         measured[:n] = np.where(usable, reading[:n] - zero, np.nan)
+        expected = inversion.reference if played.expected is None else played.expected
+        notes = []
+        for frequency, row in lines_at_rest(
+            measured - expected, self.task.lead_in, noise, self.task.rate
+        ):
+            measured -= row
+            notes.append(
+                f"interference of {float(np.std(row)) * 1e6:.3g} um RMS about {frequency:.4g} Hz, "
+                f"which is in the reading at rest, is taken off"
+            )
         error = (inversion.reference - measured)[inversion.reachable & np.isfinite(measured)]
         commanded = recording.voltage_command
         voltage = np.zeros(inversion.time.size)
@@ -365,6 +420,7 @@ class Tracking:
             predicted=None if predicted is None or predicted.size != n else predicted,
             voltage=voltage,
             noise=noise,
+            notes=tuple(notes),
         )
 
 

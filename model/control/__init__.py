@@ -7,7 +7,8 @@ from dearig.model.control.inversion import CAUSES, Inversion, Unreachable, inver
 from dearig.model.control.learning import Learner, Lesson
 from dearig.model.control.learning_settings import LearningSettings
 from dearig.model.control.limits import VoltageLimits
-from dearig.model.control.readings import mean_without_outliers
+from dearig.model.control.linear import reading_under
+from dearig.model.control.readings import lines_at_rest, mean_without_outliers
 from dearig.model.control.task import BANDWIDTH, TrackingTask
 
 __all__ = [
@@ -24,6 +25,8 @@ __all__ = [
     "Unreachable",
     "VoltageLimits",
     "invert",
+    "lines_at_rest",
     "mean_without_outliers",
+    "reading_under",
     "sensitivity_of",
 ]

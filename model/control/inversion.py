@@ -298,9 +298,8 @@ class _Job:
         self.passes += 1
         asked = np.sqrt(np.maximum(np.nan_to_num(wanted), 0.0))
         voltage = self.limits.nearest(asked, self.ceiling, self.rate)
-        drive = Drive(self.time, voltage, hold=True)
-        reading, status = reading_of(self.c, self.model.film.length, drive, self.lag)
-        if status != OK:
+        reading = self.reading(voltage)
+        if reading is None:
             return None
         error = np.where(self.inside, self.smooth - reading, 0.0)
         u = voltage * voltage
@@ -311,6 +310,12 @@ class _Job:
         width = 2 * math.ceil(0.5 * self.rate / self.bandwidth) + 1
         stuck = binary_dilation(low | high, np.ones(width, dtype=bool))
         return _Pass(u, reading, error, self.inside & ~stuck)
+
+    def reading(self, voltage: np.ndarray) -> np.ndarray | None:
+        """Return the reading (N,) m under ``voltage`` (N,) V; None where the film runs away."""
+        drive = Drive(self.time, voltage, hold=True)
+        reading, status = reading_of(self.c, self.model.film.length, drive, self.lag)
+        return reading if status == OK else None
 
     def within_field(self, found: _Pass) -> _Pass:
         """Return ``found``, with less voltage where its film is thinner than the target's.

@@ -9,15 +9,19 @@ import numpy as np
 
 from dearig.model.actuator import Actuator, Drive, reading_of
 from dearig.model.control.bands import padded_length, pass_band
+from dearig.model.control.task import TrackingTask
 from dearig.model.effects import EFFECTS
 from dearig.model.effects.description import Effect
 from dearig.model.errors import ModelError
 from dearig.model.kernel import OK
 
-__all__ = ["Linearised", "level_of", "linearise", "repeatable_part"]
+__all__ = ["Linearised", "level_of", "linearise", "reading_under", "repeatable_part"]
 
 _STEP = 0.02  # of the voltage squared
 _FLOOR = 1e-4  # of the largest gain: what is less is not inverted
+#: Of the gain on both sides of a dip: what is less is not inverted. A mean over time reads nothing
+#: of some frequencies, and its exact inverse rings there.
+_DIP = 0.1
 
 
 class Linearised:
@@ -35,7 +39,9 @@ class Linearised:
     def inverse(self, edge: float) -> np.ndarray:
         """Return the inverse (M,) in V^2/m up to ``edge`` Hz, see ``pass_band``."""
         size = np.abs(self.gain)
-        floor = _FLOOR * size.max()
+        slower = np.maximum.accumulate(size)
+        faster = np.maximum.accumulate(size[::-1])[::-1]
+        floor = np.maximum(_FLOOR * size.max(), _DIP * np.minimum(slower, faster))
         inverse = np.conj(self.gain) / (size * size + floor * floor)
         return inverse * pass_band(self.frequency, edge)
 
@@ -49,6 +55,16 @@ def repeatable_part(model: Actuator) -> Actuator:
     """Return ``model`` without what belongs to one recording: drift, interference and events."""
     kept = tuple((n, v) for n, v in model.effects if _is_repeatable(EFFECTS[n]))
     return replace(model, effects=kept)
+
+
+def reading_under(model: Actuator, task: TrackingTask, voltage: np.ndarray) -> np.ndarray:
+    """Return what the repeatable part of ``model`` reads in m under a ``voltage`` (N,) V.
+
+    It is infinite where the film does not stand that voltage.
+    """
+    c, drive = repeatable_part(model).coefficients(), Drive(task.time, voltage, hold=True)
+    reading, status = reading_of(c, model.film.length, drive, task.lag)
+    return reading if status == OK else np.full(voltage.size, np.inf)
 
 
 def _is_repeatable(effect: Effect) -> bool:

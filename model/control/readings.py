@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import binary_dilation, maximum_filter1d, median_filter, uniform_filter1d
+from scipy.optimize import minimize_scalar
 
 from dearig.model.control.learning_settings import LearningSettings
+from dearig.model.noise import READINGS_MIN, about_rest
 
 __all__ = [
     "Readings",
     "bridged",
     "has_jump",
+    "lines_at_rest",
     "mean_without_outliers",
     "noise_with_steps",
     "sorted_out",
@@ -21,6 +24,8 @@ __all__ = [
 
 _OUTLIER = 6.0  # times the median deviation: 4 standard deviations of a normal one
 _FARTHEST = 1.0  # m: no film moves so far
+_LINES = 3  # mains and its aliased harmonics are nearer to each other than a lead-in tells apart
+_STANDS_OUT = 30.0  # times the power of noise: by chance once in 10^13 lines
 _MEDIAN_OF_NORMAL = 0.6745  # median of |x| for a normal x of unit variance
 
 
@@ -103,6 +108,59 @@ def sorted_out(
         if mask.any():
             notes.append(f"{np.count_nonzero(mask)} {words} are left out")
     return Readings(given, usable & ~spikes & ~stuck, noise, notes)
+
+
+def lines_at_rest(
+    off: np.ndarray, lead_in: int, noise: float, rate: float
+) -> list[tuple[float, np.ndarray]]:
+    """Return what is periodic in a run and also at rest, such as mains interference.
+
+    ``off`` (N,) in m are readings less what was expected, NaN where there is none, at ``rate`` Hz.
+    The first ``lead_in``, in which nothing moves the film, tell about which frequencies there are
+    lines; the whole run tells apart up to ``_LINES`` there that stand out from the ``noise`` in m.
+    Each item is a frequency in Hz, and the sum (N,) in m of the lines there.
+    """
+    rest, known = off[:lead_in], np.isfinite(off)
+    if rest.size < READINGS_MIN or not known[:lead_in].all():
+        return []
+    time, left = np.arange(off.size) / rate, np.where(known, off, 0.0)
+    bare, numbers = about_rest(time[:lead_in], rest)
+    periodic = rest - bare
+    periodic -= np.polyval(np.polyfit(time[:lead_in], periodic, 1), time[:lead_in])
+    found = []
+    for _ in range((numbers - 2) // 3):  # a straight line, and three numbers of each
+        frequency = float(np.argmax(np.abs(np.fft.rfft(periodic)))) * rate / rest.size
+        whole = np.zeros(off.size)
+        for _ in range(_LINES):
+            row = _sine(time, left - whole * known, frequency, rate / rest.size)
+            # the power of noise in one line of N samples is noise^2/N
+            if 0.5 * float(np.mean(row**2)) < _STANDS_OUT * noise**2 / off.size:
+                break
+            whole += row
+        left, periodic = left - whole * known, periodic - whole[:lead_in]
+        found.append((frequency, whole))
+    return [(frequency, whole) for frequency, whole in found if whole.any()]
+
+
+def _sine(time: np.ndarray, values: np.ndarray, frequency: float, within: float) -> np.ndarray:
+    """Return the strongest sine (N,) in ``values`` (N,) ``within`` so many Hz of ``frequency``."""
+    line = 1.0 / (time.size * time[1])
+    near = np.fft.rfftfreq(time.size, time[1])
+    power = np.where(np.abs(near - frequency) <= within, np.abs(np.fft.rfft(values)), 0.0)
+    middle = float(near[np.argmax(power)])
+
+    def waves(of: float) -> np.ndarray:
+        turn = 2.0 * math.pi * of * time
+        return np.array([np.cos(turn), np.sin(turn)])
+
+    best = minimize_scalar(
+        lambda of: -float(np.sum((waves(of) @ values) ** 2)),
+        bounds=(middle - line, middle + line),
+        method="bounded",
+        options={"xatol": 1e-4 * line},
+    )
+    both = waves(float(best.x))
+    return np.asarray(np.linalg.solve(both @ both.T, both @ values) @ both)
 
 
 def _stuck(
