@@ -164,6 +164,7 @@ class Learner:
         self._best: _Run | None = None
         self._lacking: list[np.ndarray] = []  # raw, of the last runs
         self._learned: _Step | None = None  # the last step
+        self._failed = 0  # steps since the best run
         self.settled = ""  #: why nothing more is learned
 
     @property
@@ -233,6 +234,7 @@ class Learner:
             if now > before - scatter:
                 self._settle(best, _NO_BETTER, notes)
                 return self._lesson(rms, largest, samples, learned=False, notes=notes)
+        self._failed = 0
         self._best = replace(run, lacking=self._repeated(lacking, notes))
         return self._follow(self._best, rms, largest, samples, notes)
 
@@ -282,6 +284,10 @@ class Learner:
             f"the error has grown from {best.rms * 1e6:.3g} um: the run is stepped back from, and "
             f"less is learned"
         )
+        self._failed += 1
+        if self._failed >= self._settings.step_backs:
+            self._settle(best, _NO_BETTER, notes)
+            return self._lesson(rms, largest, samples, learned=False, notes=notes)
         return self._follow(best, rms, largest, samples, notes)
 
     def _lesson(

@@ -35,6 +35,9 @@ class LearningSettings:
         Width of the bands in which errors are compared, and twice that by which the band of Q is
         widened or narrowed at once: Q falls over an octave, so a run tells of one more than it
         learned.
+    step_backs
+        Steps in a row that are stepped back from, at which the learning ends. Each learns half the
+        band of the one before: where two fail, it is not the band that is wrong.
     spike
         Noises by which a spike differs from its neighbours, and standard deviations of a jump.
         Gaussian noise reaches 5 once in a million readings; the rest is for heavier tails.
@@ -66,6 +69,7 @@ class LearningSettings:
     phase_max_deg: float = 60.0
     ratio_octaves: float = 0.5
     octaves: float = 2.0
+    step_backs: int = 2
     spike: float = 8.0
     spike_readings: int = 11
     stuck_s: float = 0.05

@@ -127,7 +127,7 @@ def lines_at_rest(
     bare, numbers = about_rest(time[:lead_in], rest)
     periodic = rest - bare
     periodic -= np.polyval(np.polyfit(time[:lead_in], periodic, 1), time[:lead_in])
-    found = []
+    found: dict[float, np.ndarray] = {}
     for _ in range((numbers - 2) // 3):  # a straight line, and three numbers of each
         frequency = float(np.argmax(np.abs(np.fft.rfft(periodic)))) * rate / rest.size
         whole = np.zeros(off.size)
@@ -138,8 +138,8 @@ def lines_at_rest(
                 break
             whole += row
         left, periodic = left - whole * known, periodic - whole[:lead_in]
-        found.append((frequency, whole))
-    return [(frequency, whole) for frequency, whole in found if whole.any()]
+        found[frequency] = found.get(frequency, 0.0) + whole
+    return [(frequency, whole) for frequency, whole in found.items() if whole.any()]
 
 
 def _sine(time: np.ndarray, values: np.ndarray, frequency: float, within: float) -> np.ndarray:

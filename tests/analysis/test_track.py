@@ -51,6 +51,11 @@ STIFFER = replace(
     equilibrium=replace(TABLE_3.equilibrium, modulus=1.15 * TABLE_3.equilibrium.modulus),
 )
 WRONG = ModelFile("stiffer", Actuator(THESIS_FILM, THESIS_LOAD, STIFFER))
+SOFT = replace(
+    TABLE_3,
+    equilibrium=replace(TABLE_3.equilibrium, modulus=0.7 * TABLE_3.equilibrium.modulus),
+)
+WORSE = ModelFile("softer", Actuator(THESIS_FILM, THESIS_LOAD, SOFT))
 
 
 def target(text=PATH):
@@ -66,17 +71,21 @@ def followed(folder, model=MODEL, **options):
 
 @pytest.fixture(scope="module")
 def learned(tmp_path_factory):
-    """A wrong model that learns, beside the right one and a linear map."""
+    """A wrong model that learns, beside a worse one and a linear map."""
     folder = tmp_path_factory.mktemp("learned") / "out"
     return followed(
-        folder, WRONG, iterations=3, compare=MODEL, options=RunOptions(notes="before lunch")
+        folder, WRONG, iterations=3, compare=WORSE, options=RunOptions(notes="before lunch")
     )
 
 
-def test_the_right_model_follows_within_the_noise(learned):
-    right = learned.runs[1]
+def test_a_model_that_predicts_worse_than_the_compared_one_is_not_followed(tmp_path):
+    _, right, first = followed(tmp_path / "out", WRONG, compare=MODEL).runs
     assert right.kind == "thesis"
-    assert right.rms < 1.2 * learned.noise
+    assert right.rms < 1.2 * right.noise
+    assert "'stiffer' predicts this run with an error of" in right.notes[-1]
+    assert first.kind == "model"
+    np.testing.assert_array_equal(first.voltage, right.voltage)
+    assert "Table 3" in open_recording(first.recording).model_toml
 
 
 def test_a_wrong_model_learns(learned):
@@ -86,7 +95,8 @@ def test_a_wrong_model_learns(learned):
     assert ours[-1].rms < 1.5 * learned.noise
     assert learned.best.rms == min(run.rms for run in ours)
     assert learned.runs[0].kind == "linear"
-    assert learned.runs[0].rms > 5.0 * learned.runs[1].rms
+    assert learned.runs[0].rms > 5.0 * ours[-1].rms
+    assert not learned.runs[1].notes  # the worse model is not followed
     assert learned.status == "complete"
 
 

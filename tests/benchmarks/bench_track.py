@@ -298,8 +298,9 @@ def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None) -> Row:
     return Row(
         seed=seed, hidden=case.families, what=case.description,
         found=", ".join(name for name, _ in model.model.effects) or "nothing", verdict=verdict,
-        chosen=not np.array_equal(first.voltage, fitted.voltage), noise=noise * 1e6, floor=math.hypot(left, noise) * 1e6,
-        linear=read(linear), thesis=read(fitted), diagnosed=read(first),
+        chosen=not np.array_equal(first.voltage, fitted.voltage), noise=noise * 1e6,
+        floor=math.hypot(left, noise) * 1e6, linear=read(linear),
+        thesis=read(fitted), diagnosed=read(first),
         learned=tuple(read(run) for run in learned),
         pid=error(loop.follow(path, lowered(loop, path, gains))),
         pid_ahead=error(loop.follow(path, lowered(loop, path, helped))),

@@ -165,3 +165,15 @@ def test_a_target_of_nothing_takes_no_voltage():
     found = inverted(THESIS, np.zeros(400))
     assert found.feasible
     assert found.voltage.max() < 1.0  # V
+
+
+def test_a_sensor_that_reads_nothing_of_some_frequencies_makes_no_voltage_ring():
+    averaging = with_effect(THESIS, "sensor averaging", {"window": 0.04})  # nothing at 25 Hz
+    wanted = task(path(5.0, 10e-6))
+    frequency = np.fft.rfftfreq(wanted.samples, 1.0 / RATE)
+    near = (frequency > 20.0) & (frequency < 30.0)
+    with_it, without = (
+        np.abs(np.fft.rfft(np.square(invert(model, wanted).voltage)))[near]
+        for model in (averaging, THESIS)
+    )
+    assert with_it.max() < 3.0 * without.max()

@@ -133,6 +133,18 @@ def test_a_run_that_got_worse_is_stepped_back_from():
     assert teacher.best_rms == best < first.rms
 
 
+def test_two_steps_that_fail_end_the_learning():
+    rig, teacher = hiding("dry friction"), learner()
+    teacher.learn(rig.play(teacher), NOISE)
+    best = teacher.voltage.copy()
+    teacher.learn(rig.play(teacher), NOISE)
+    for _ in range(2):
+        assert not teacher.settled
+        teacher.learn(rig.play(teacher) * 1.2, NOISE)
+    assert teacher.settled
+    np.testing.assert_array_equal(teacher.voltage, best)
+
+
 def test_a_voltage_whose_error_is_noise_is_kept():
     rig, teacher = hiding("slow branch"), learner()
     teacher.learn(rig.play(teacher), NOISE)
