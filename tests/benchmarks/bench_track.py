@@ -14,7 +14,8 @@ noise, its limits and the same path; they get the nearest feasible one for nothi
 Rigs are the first ``--rigs`` from ``--first`` on that hide something; one on which an interlock
 ends a run is left out, and its seed printed. ``--out FILE`` keeps a line of JSON for each rig:
 those that are in it are not played again. ``--models FOLDER`` keeps the fitted models: rigs whose
-models are in it are not fitted again.
+models are in it are not fitted again. Tuning the PID loops takes most of the time, and ``--pid``
+leaves them out after so many rigs.
 
 Errors are target minus measured, RMS, where the model with the effect can follow. "Beyond the
 noise" is the root of the difference of the squares of error and noise, that of all runs together.
@@ -134,6 +135,7 @@ def main() -> None:
     parser.add_argument("--seeds", help="rigs, such as 3,17, in place of those")
     parser.add_argument("--fit", choices=FITS, default="diagnosis", help="the models [diagnosis]")
     parser.add_argument("--out", type=FilePath, help="keep a line of JSON for each rig here")
+    parser.add_argument("--pid", type=int, default=40, help="rigs with the PID loops [40]")
     parser.add_argument("--models", type=FilePath, help="keep the fitted models in this folder")
     given = parser.parse_args()
     seeds = list(islice(_hiding(given.first), given.rigs))
@@ -148,12 +150,15 @@ def main() -> None:
     print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
     rows: list[Row] = []
     stopped: list[int] = []
-    for seed in seeds:
+    for number, seed in enumerate(seeds):
         row = kept.get(seed)
         if row is None:
             try:
                 with tempfile.TemporaryDirectory() as folder:
-                    row = _row(seed, FITS[given.fit], FilePath(folder), given.models)
+                    row = _row(
+                        seed, FITS[given.fit], FilePath(folder), given.models,
+                        with_pid=number < given.pid,
+                    )  # fmt: skip
             except SafetyStop as stop:
                 print(f"{seed} ({drawn(seed).description}): {stop}", file=sys.stderr, flush=True)
                 stopped.append(seed)
@@ -167,7 +172,8 @@ def main() -> None:
             row.learned[-1], row.pid, row.pid_ahead, row.model_free[-1],
         )  # fmt: skip
         found = row.found if row.chosen else f"{row.found} (not followed)"
-        cells = [f"{' + '.join(row.hidden)} ({seed})", found, *(f"{f:.2f}" for f in figures)]
+        shown = ("" if math.isnan(f) else f"{f:.2f}" for f in figures)
+        cells = [f"{' + '.join(row.hidden)} ({seed})", found, *shown]
         print("| " + " | ".join(cells) + " |", flush=True)
     print(f"\nRigs on which an interlock ended a run, left out: {stopped or 'none'}.")
     _summary(rows)
@@ -229,11 +235,13 @@ def _summary(rows: list[Row]) -> None:
         ("PID and linear map", lambda r: r.pid_ahead),
         (f"model-free {ITERATIONS}", lambda r: r.model_free[-1]),
     ):
-        parts = [of(r) / r.noise for r in rows]
+        parts = [of(r) / r.noise for r in rows if math.isfinite(of(r))]
+        if not parts:
+            continue
         print(
-            f"{name}: error over noise, median {np.median(parts):.2f}, nine in ten below "
-            f"{np.quantile(parts, 0.9):.2f}, largest {max(parts):.2f}; at most 1.5: "
-            f"{sum(part <= 1.5 for part in parts)}"
+            f"{name} ({len(parts)} rigs): error over noise, median {np.median(parts):.2f}, "
+            f"nine in ten below {np.quantile(parts, 0.9):.2f}, largest {max(parts):.2f}; "
+            f"at most 1.5: {sum(part <= 1.5 for part in parts)}"
         )
     for r in rows:
         print(
@@ -251,7 +259,7 @@ def _beyond(error: float, noise: float) -> float:
     return math.sqrt(max(error * error - noise * noise, 0.0))
 
 
-def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None) -> Row:
+def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None, *, with_pid: bool) -> Row:
     """Errors of everything on the rig ``sim:seed``; ``models`` is where fitted models are kept."""
     address, rig = f"sim:{seed}", RigFile(card=CardSettings(sample_rate_Hz=RATE))
     thesis, model, verdict = _models(seed, rig, fit, models or folder, folder / "thesis.h5")
@@ -289,11 +297,7 @@ def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None) -> Row:
     noise = math.sqrt(np.mean([run.noise**2 for run in ours.runs]))
     at = 0.5 * path.limits.voltage
     film = Rig(plant, noise, _static(plant, at) / at**2, np.random.default_rng(seed))
-    loop = Loop(film, path.limits, RATE)
-    # a user tunes on the sines, without the slow way back
-    trial = path.part(slice(int(np.argmax(inside)), -round(13.0 * RATE)))
-    gains, trials = tuned(loop, trial)
-    helped, more = tuned(loop, trial, replace(gains, ahead=1.0 / film.gain))
+    pid = _with_pid(film, path) if with_pid else (math.nan, math.nan, (0, 0))
     case = drawn(seed)
     return Row(
         seed=seed, hidden=case.families, what=case.description,
@@ -302,9 +306,7 @@ def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None) -> Row:
         floor=math.hypot(left, noise) * 1e6, linear=read(linear),
         thesis=read(fitted), diagnosed=read(first),
         learned=tuple(read(run) for run in learned),
-        pid=error(loop.follow(path, lowered(loop, path, gains))),
-        pid_ahead=error(loop.follow(path, lowered(loop, path, helped))),
-        trials=(trials, more),
+        pid=pid[0], pid_ahead=pid[1], trials=pid[2],
         model_free=tuple(error(read) for read in Learning(film, path).runs(ITERATIONS)[1:]),
         film=(
             of_film(fitted.voltage), of_film(found.voltage), of_film(first.voltage),
@@ -312,6 +314,20 @@ def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None) -> Row:
         ),
         notes=tuple(dict.fromkeys(note for run in ours.runs for note in run.notes)),
     )  # fmt: skip
+
+
+def _with_pid(film: Rig, path: Path) -> tuple[float, float, tuple[int, int]]:
+    """Errors in um of the PID loops, alone and with the linear map, and their tuning runs."""
+    loop = Loop(film, path.limits, RATE)
+    # a user tunes on the sines, without the slow way back
+    trial = path.part(slice(int(np.argmax(path.inside)), -round(13.0 * RATE)))
+    gains, trials = tuned(loop, trial)
+    helped, more = tuned(loop, trial, replace(gains, ahead=1.0 / film.gain))
+    alone, ahead = (
+        path.error(loop.follow(path, lowered(loop, path, chosen))) * 1e6
+        for chosen in (gains, helped)
+    )
+    return alone, ahead, (trials, more)
 
 
 def _models(
