@@ -5,9 +5,10 @@ are killed; it needs the extra ``cluster``.
 
 ``python -m tests.benchmarks.bench_study --beside 1000`` plays ``dearig study --do identify`` with
 two processes beside bare fits of the same recordings: ``identify_recordings`` of each path, in a
-``multiprocessing`` pool of two. Both are whole programs. They run in turns of a few seconds, the
-other one being stopped (SIGSTOP), so that the load of the machine is the same for both. It prints
-their processor times, those of blocks of a tenth of the recordings, and the sums of their turns.
+``multiprocessing`` pool of two. Both are whole programs, and read the files themselves. They run in
+turns of a few seconds, the other one being stopped (SIGSTOP), so that the load of the machine is
+the same for both. It prints their processor times and the sums of their turns, after each tenth of
+the recordings. With ``--kept FOLDER`` the recordings are made there once, and used again.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ _BLOCKS = 10
 
 def bare_fit(path: str) -> tuple[str, float]:
     """Return the name of a recording, and mu_0 in kPa of a model with one branch."""
-    found = parameters_of(identify_recordings([path], branches=(1,)))
+    found = parameters_of(identify_recordings([path], branches=(1,), intervals=False))
     return Path(path).name, next(p["value"] for p in found if p["name"] == "mu_0_kPa")
 
 
@@ -162,47 +163,74 @@ class Turns:
             self.cpu = sum(each.user + each.system for each in spent)
         self.seen.append((self.count(), self.cpu))
 
-    def blocks(self, recordings: int) -> np.ndarray:
-        """Processor time in s of each tenth of the recordings."""
+    def close(self) -> None:
+        """End the program where it has not ended."""
+        if not self.ended:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+
+    def cost(self, recordings: float) -> float:
+        """Return the processor time in s until so many ``recordings`` were done."""
         rows, cpu = np.array(self.seen, dtype=float).T
-        return np.diff(np.interp(np.linspace(0, recordings, _BLOCKS + 1), rows, cpu))
+        return float(np.interp(recordings, rows, cpu))
 
 
-def beside(folder: Path, count: int) -> None:
-    """Play a study beside bare fits of the same ``count`` recordings, in turns."""
-    recordings = made(folder, count)
-    bare_fit(str(next(recordings.glob("*.h5"))))  # the kernels are compiled and kept
+def beside(folder: Path, recordings: Path) -> None:
+    """Play a study beside bare fits of the same ``recordings``, in turns."""
+    paths = sorted(recordings.glob("*.h5"))
+    count = len(paths)
+    bare_fit(str(paths[0]))  # the kernels are compiled and kept
     told, out = folder / "bare.txt", folder / "out"
-    me = [sys.executable, "-m", "tests.benchmarks.bench_study"]
     fits = Turns(
-        [*me, "--bare", str(recordings), str(told)],
+        [
+            sys.executable,
+            "-m",
+            "tests.benchmarks.bench_study",
+            "--bare",
+            str(recordings),
+            str(told),
+        ],
         lambda: told.read_text().count("\n") if told.exists() else 0,
     )
     study = Turns(
         [sys.executable, "-m", "dearig", "study", str(recordings), "--do", "identify",
-         "--branches", "1", "--workers", "2", "--out", str(out)],
+         "--branches", "1", "--no-intervals", "--workers", "2", "--out", str(out)],
         lambda: len(list((out / "cache").glob("*.json"))),
     )  # fmt: skip
-    while not (fits.ended and study.ended):
+    try:
+        print(f"{count} recordings of sim:0 to sim:{count - 1}, one branch, two processes")
+        print("recordings   bare: s of a core   study: s of a core   the block   from the start")
+        before, parts = (0.0, 0.0), []
+        for stop in np.linspace(0, count, _BLOCKS + 1)[1:]:
+            while min(fits.seen[-1][0], study.seen[-1][0]) < stop:
+                for each in (fits, study):
+                    if not each.ended:
+                        each.take()
+            now = fits.cost(stop), study.cost(stop)
+            parts.append((now[1] - before[1]) / (now[0] - before[0]) - 1.0)
+            print(
+                f"{stop:10.0f} {now[0]:19.1f} {now[1]:20.1f} {100.0 * parts[-1]:+9.1f} % "
+                f"{100.0 * (now[1] / now[0] - 1.0):+14.1f} %",
+                flush=True,
+            )
+            before = now
         for each in (fits, study):
-            if not each.ended:
+            while not each.ended:
                 each.take()
+    finally:
+        fits.close()
+        study.close()
     values = dict(line.split() for line in told.read_text().splitlines())
     rows = read_table(out / "study.csv")
     same = sum(float(values[row["recording"]]) == row["mu_0_kPa"] for row in rows)
-    first, second = fits.blocks(count), study.blocks(count)
-    parts = 100.0 * (second / first - 1.0)
-    more = 100.0 * (study.cpu / fits.cpu - 1.0)
+    error = np.std(parts, ddof=1) / np.sqrt(len(parts))
     print(
-        f"{count} recordings of sim:0 to sim:{count - 1}, one branch with intervals, two "
-        f"processes; mu_0 the same to the last digit in {same}\n"
-        f"bare fits:     {fits.cpu:7.1f} s of a core, {fits.wall:7.1f} s of turns "
-        f"({fits.cpu / count:.3f} s a fit)\n"
-        f"dearig study:  {study.cpu:7.1f} s of a core, {study.wall:7.1f} s of turns\n"
-        f"study over bare fits: {more:+.1f} % of processor time, "
-        f"{100.0 * (study.wall / fits.wall - 1.0):+.1f} % of wall time (limit: 5 %)\n"
-        f"by tenths of the recordings: {', '.join(f'{part:+.1f}' for part in parts)} %; mean "
-        f"{parts.mean():+.1f} +- {parts.std(ddof=1) / np.sqrt(parts.size):.1f} %"
+        f"to the end of the programs: bare {fits.cpu:.1f} s of a core in {fits.wall:.0f} s of "
+        f"turns ({fits.cpu / count:.3f} s a fit), study {study.cpu:.1f} s in {study.wall:.0f} s\n"
+        f"more for the study: {100.0 * (study.cpu / fits.cpu - 1.0):+.1f} % of processor time "
+        f"(standard error of the blocks {100.0 * error:.1f} %), "
+        f"{100.0 * (study.wall / fits.wall - 1.0):+.1f} % of the turns (limit: 5 %)\n"
+        f"mu_0 is the same to the last digit in {same} of {count}"
     )
 
 
@@ -211,6 +239,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=8)
     parser.add_argument("--empty", type=int, default=300, help="Tasks without work.")
     parser.add_argument("--beside", type=int, default=0, metavar="RECORDINGS")
+    parser.add_argument("--kept", type=Path, metavar="FOLDER")
     parser.add_argument("--bare", type=Path, nargs=2, help=argparse.SUPPRESS)
     asked = parser.parse_args()
     count, empty = asked.recordings, asked.empty
@@ -219,7 +248,11 @@ def main() -> None:
         return
     if asked.beside:
         with tempfile.TemporaryDirectory() as made_folder:
-            beside(Path(made_folder), asked.beside)
+            folder = Path(made_folder) if asked.kept is None else asked.kept
+            recordings = folder / "recordings"
+            beside(
+                Path(made_folder), recordings if recordings.exists() else made(folder, asked.beside)
+            )
         print(cores_and_load())
         return
     options = StudyOptions("identify")
