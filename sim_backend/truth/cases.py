@@ -114,7 +114,12 @@ FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
 #: name, so that what an address without that name hides never changes.
 ROOM_FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
     {
-        "humidity": (humidity.plasticised, humidity.swollen, humidity.losing_contact),
+        "humidity": (
+            humidity.plasticised,
+            humidity.swollen,
+            humidity.losing_contact,
+            humidity.conducting,
+        ),
         "weather": (thermal.weathered,),
     }
 )

@@ -3,13 +3,16 @@
 The mean moisture of a film of thickness Z whose faces are in equilibrium with the air is a sum over
 the modes of diffusion: each follows the air with the time tau/(2k + 1)^2, tau = Z^2/(pi^2 D), and
 has the weight 8/(pi^2 (2k + 1)^2) (Crank, The Mathematics of Diffusion, 1975, section 4.3). The
-film therefore remembers the room of the hours before. Three forms of what moisture does:
+film therefore remembers the room of the hours before. Four forms of what moisture does:
 
 ``plasticised``: moduli fall as exp(-a c), c the moisture from 0 (dry) to 1 (saturated), as a film's
 do whose glass transition water lowers. ``swollen``: water is a second phase with a permittivity of
 80 in the volume share c^1.5 v, mixed by Looyenga's law, eps^(1/3) = (1 - p) e^(1/3) + p 80^(1/3)
 (Physica 31, 401 (1965)). ``losing_contact``: the electrode's resistance grows as (1 + c)^n with the
-air itself; the film charges through it.
+air itself; the film charges through it. ``conducting``: ions in the water carry a current, and the
+resistance of the film falls as c^-n between 30 and 90 % of humidity, as Hearle measured it (J.
+Text. Inst. 44, T117 (1953); Morton and Hearle, Physical Properties of Textile Fibres, 22.4.1).
+There n is 7 to 13 for hygroscopic fibres; the films that are drawn are less so.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import COURSE_ELECTRIC, COURSE_STIFFNESS, FilmNumbers
 from dearig.sim_backend.truth.sampling import log_uniform
 
-__all__ = ["losing_contact", "plasticised", "swollen"]
+__all__ = ["conducting", "losing_contact", "plasticised", "swollen"]
 
 _REFERENCE = 0.5  # relative humidity at which a film has the numbers of its data
 _MODES = 6
@@ -38,6 +41,10 @@ _WATER = (0.004, 0.02)  # v, in a saturated room
 _WATER_PERMITTIVITY, _FILM_PERMITTIVITY = 80.0, 4.7
 _RESISTANCE = (2e7, 1.5e8)  # ohm at the reference
 _POWER = (2.0, 6.0)
+_SERIES = (1e6, 3e6)  # ohm, of the electrodes through which a leaking film is supplied
+_LOST = (50.0, 250.0)  # V lost in them at 8 kV and at the reference
+_AT = 8000.0  # V
+_CONDUCTING = (3.0, 8.0)  # n
 
 
 class _Moisture:
@@ -155,5 +162,31 @@ def losing_contact(generator: np.random.Generator, load: Load) -> TruthEffect:  
 
     def in_room(air: Air) -> TruthEffect:
         return TruthEffect("humidity", "electrode", words, in_room=in_room, on_film=charging(air))
+
+    return TruthEffect("humidity", "electrode", words, in_room=in_room)
+
+
+def conducting(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Draw a film whose conductance grows with its moisture."""
+    series = log_uniform(generator, *_SERIES)
+    current = log_uniform(generator, *_LOST) / series
+    power, sorption = log_uniform(generator, *_CONDUCTING), log_uniform(generator, *_SORPTION)
+    words = (
+        f"leakage of {current * 1e6:.3g} uA at 8 kV and 50 % behind {series / 1e6:.3g} Mohm, "
+        f"growing with the power {power:.2g} of the moisture, which follows in {sorption:.3g} s"
+    )
+
+    def leaking(air: Air) -> Callable[[FilmNumbers], FilmNumbers]:
+        # a run is short beside the sorption: the conductance is that of its beginning
+        moist = float(_Moisture(air, sorption).at(np.zeros(1))[0])
+        conductance = current / _AT * (max(moist, 0.0) / _REFERENCE) ** power
+
+        def on_film(numbers: FilmNumbers) -> FilmNumbers:
+            return numbers.hiding(leak_series=series, leak_conductance=conductance)
+
+        return on_film
+
+    def in_room(air: Air) -> TruthEffect:
+        return TruthEffect("humidity", "electrode", words, in_room=in_room, on_film=leaking(air))
 
     return TruthEffect("humidity", "electrode", words, in_room=in_room)
