@@ -45,7 +45,8 @@ def prepare(extras: str = "", venv: Path = VENV) -> Path:
     subprocess.run(
         [
             str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
-            "--constraint", str(CONSTRAINTS), "--editable", project,
+            # most modules are never imported; Python compiles the others when they are
+            "--no-compile", "--constraint", str(CONSTRAINTS), "--editable", project,
         ],
         check=True,
     )  # fmt: skip
@@ -95,9 +96,9 @@ def _install_packages(packages: list[str], why: str) -> None:
 
 def run(arguments: list[str], **environment: str) -> int:
     """Run a command in the project's folder and return its exit code."""
+    # modules are compiled when they are first imported, and only then
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "", **environment}
     try:
-        return subprocess.run(
-            arguments, cwd=ROOT, check=False, env={**os.environ, **environment}
-        ).returncode
+        return subprocess.run(arguments, cwd=ROOT, check=False, env=environment).returncode
     except KeyboardInterrupt:
         return 130

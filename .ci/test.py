@@ -13,8 +13,6 @@ def test(python: Path, *arguments: str) -> int:
         [str(python), "-m", "pytest", "-n", "2", *arguments],
         # two processes have two cores: threads of linear algebra would wait for each other
         OPENBLAS_NUM_THREADS="1",
-        # hundreds of tests start a program of their own, which would compile its modules anew
-        PYTHONDONTWRITEBYTECODE="",
     )
 
 

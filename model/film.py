@@ -12,6 +12,7 @@ from dearig.model.coefficients import EFFECTS_AT, MODULUS, REST, WIDTH
 from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, EffectValues
 from dearig.model.errors import ModelError
 from dearig.model.film_kernel import add_effects, drive_by_stretch
+from dearig.model.jit import read_only
 from dearig.model.material import Network
 from dearig.model.network import HEAD
 from dearig.model.specimen import KINEMATICS
@@ -89,7 +90,7 @@ def stress_of(c: np.ndarray, time: np.ndarray, stretch: np.ndarray) -> tuple[np.
     if not np.array_equal(c[EFFECTS_AT : EFFECTS_AT + PARAMETER_COUNT], NEUTRAL):
         c = c.copy()
         c[REST] = stretch[0]
-        add_effects(c, time, stretch, np.zeros(MEMORY), stress)
+        add_effects(c, read_only(time), read_only(stretch), np.zeros(MEMORY), stress)
     return stress, status, reached
 
 
@@ -100,5 +101,5 @@ def unit_stresses(
     springs = (c.size - HEAD) // WIDTH
     parts = np.zeros((springs, time.size))
     xi = np.full(springs - 1, stretch[0])
-    status, reached = drive_by_stretch(c, time, stretch, xi, parts)
+    status, reached = drive_by_stretch(c, read_only(time), read_only(stretch), xi, parts)
     return parts, status, reached

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core.caching import FunctionCache
 
 from dearig.model.plugins import entry_points_found, source_files
@@ -35,6 +36,7 @@ __all__ = [
     "is_compiled",
     "is_enabled",
     "jit",
+    "read_only",
     "use_cache_without",
 ]
 
@@ -197,3 +199,14 @@ def allocating(function: _Function) -> _Function:
 def inlined(function: _Function) -> _Function:
     """Compile as ``jit`` does, into the caller: literal arguments become constants there."""
     return _compile(function, _nrt=False, inline="always")
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """Return a view of ``array`` that cannot be written.
+
+    To numba an array that can be written is of another type, for which it compiles a kernel anew:
+    half a minute where a record comes from a file after one that was computed.
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
-from typing import Protocol, cast
+from typing import Any, Protocol, TypeVar, cast
 
 from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Slot
 from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QKeySequence, QShowEvent
@@ -34,6 +35,7 @@ from dearig.window.follow_page import FollowPage
 from dearig.window.guide import Guide
 from dearig.window.hv_bar import HighVoltageBar
 from dearig.window.layout_state import GROUP
+from dearig.window.library import shared_library
 from dearig.window.main import NO_SCREEN
 from dearig.window.planner import Planner
 from dearig.window.questions import may_close, offer_unsaved
@@ -61,6 +63,19 @@ class Page(Protocol):
     shortcut: str
 
 
+#: Attributes of ``MainWindow`` that are pages, and their classes, in the order of the list.
+_PAGES: dict[str, type[Page]] = {
+    "rig_page": RigPage,
+    "sequence_page": SequencePage,
+    "run_page": RunPage,
+    "recordings_page": RecordingsPage,
+    "study_page": StudyPage,
+    "follow_page": FollowPage,
+    "campaign_page": CampaignPage,
+}
+_AnyPage = TypeVar("_AnyPage", bound=QWidget)
+
+
 class MainWindow(QMainWindow):
     """Holds the pages; it closes only when the rig is safe."""
 
@@ -70,22 +85,11 @@ class MainWindow(QMainWindow):
         self.setWindowTitle("dearig[*]")  # Qt shows a mark there while something is not saved
         self.planner = Planner(session, self)
         self.compilation = Compilation(self)
+        self.library = shared_library(session)  # lists the folder while the window is made
         self.rig_page = RigPage(session)
         self.sequence_page = SequencePage(session)
         self.run_page = RunPage(session)
-        self.recordings_page = RecordingsPage(session)
-        self.study_page = StudyPage(session)
-        self.follow_page = FollowPage(session)
         self.campaign_page = CampaignPage(session, self.run_page.runner)
-        self.pages: tuple[QWidget, ...] = (
-            self.rig_page,
-            self.sequence_page,
-            self.run_page,
-            self.recordings_page,
-            self.study_page,
-            self.follow_page,
-            self.campaign_page,
-        )
         self.stop_keys = StopKeys(self.run_page.stop, lambda: session.busy, self)
         self._guide: Guide | None = None
         self._closing = False
@@ -97,16 +101,71 @@ class MainWindow(QMainWindow):
         if not self.compilation.start():
             self.planner.renew()
 
+    # pages
+
+    @property
+    def pages(self) -> tuple[QWidget, ...]:
+        """All pages in the order of the list; those that nobody has needed yet are made."""
+        return tuple(self._page(row) for row in range(len(_PAGES)))
+
+    @cached_property
+    def recordings_page(self) -> RecordingsPage:
+        """The page Recordings, made when it is first needed, as are Study and Follow.
+
+        These three take half the time of a start.
+        """
+        page = RecordingsPage(self.session)
+        page.open_sequence.connect(self._read_sequence)
+        return self._put("recordings_page", page)
+
+    @cached_property
+    def study_page(self) -> StudyPage:
+        """The page Study; see ``recordings_page``."""
+        page = StudyPage(self.session)
+        page.open_sequence.connect(self._play_sequence)
+        page.show_model.connect(self._show_model)
+        page.study_finished.connect(self._study_finished)
+        return self._put("study_page", page)
+
+    @cached_property
+    def follow_page(self) -> FollowPage:
+        """The page Follow; see ``recordings_page``."""
+        page, run = FollowPage(self.session), self.run_page
+        page.play_sequence.connect(self._play_file)
+        page.use_model.connect(run.show_model)
+        page.hold.play_hold.connect(self._play_hold)
+        run.started.connect(page.hold.watch)
+        run.runner.ended.connect(page.hold.run_ended)
+        page.waits.connect(run.follow_button.setVisible)
+        return self._put("follow_page", page)
+
+    def _put(self, name: str, page: _AnyPage) -> _AnyPage:
+        """Put the page ``name`` into its place, which is empty and not shown."""
+        row = list(_PAGES).index(name)
+        place = cast(QWidget, self.stack.widget(row))
+        self.stack.insertWidget(row, page)
+        self.stack.removeWidget(place)
+        place.deleteLater()
+        return page
+
+    def _page(self, row: int) -> QWidget:
+        page: QWidget = getattr(self, list(_PAGES)[row])
+        return page
+
+    def _made(self, *names: str) -> list[Any]:
+        """Return those of the pages with these attributes' ``names`` that have been made."""
+        return [vars(self)[name] for name in names if name in vars(self)]
+
     # commands
 
     def show_page(self, page: QWidget) -> None:
         """Bring ``page`` to the front."""
-        self.list.setCurrentRow(self.pages.index(page))
+        self.list.setCurrentRow(self.stack.indexOf(page))
 
     def _show_page_titled(self, title: str) -> None:
-        for page in self.pages:
-            if cast(Page, page).title == title:
-                self.show_page(page)
+        titles = [page.title for page in _PAGES.values()]
+        if title in titles:
+            self.list.setCurrentRow(titles.index(title))
 
     @Slot()
     def show_guide(self) -> None:
@@ -121,10 +180,9 @@ class MainWindow(QMainWindow):
         """Give all parts the sizes and places of the first start."""
         for key in ("geometry", "page", GROUP):
             self.session.settings.remove(key)
-        for page in (
-            self.sequence_page, self.recordings_page, self.study_page, self.follow_page,
-            self.campaign_page,
-        ):  # fmt: skip
+        for page in self._made(
+            "sequence_page", "recordings_page", "study_page", "follow_page", "campaign_page"
+        ):
             page.reset_layout()
         self._default_geometry()
         self.show_page(self.run_page)
@@ -166,11 +224,12 @@ class MainWindow(QMainWindow):
         self.compilation.close()
         self.bar.close_work()
         self.planner.close()
-        for page in (
-            self.rig_page, self.sequence_page, self.recordings_page, self.study_page,
-            self.follow_page, self.campaign_page,
+        for page in self._made(
+            "rig_page", "sequence_page", "recordings_page", "study_page", "follow_page",
+            "campaign_page",
         ):  # fmt: skip
             page.close_work()
+        self.library.close()
         event.accept()
 
     @Slot()
@@ -190,7 +249,7 @@ class MainWindow(QMainWindow):
             {
                 "sequence": self.sequence_page.restore,
                 "rig file": self.rig_page.restore,
-                "target": self.follow_page.target.restore,
+                "target": lambda text, file: self.follow_page.target.restore(text, file),
                 "plan": self.campaign_page.plan.restore,
             },
         )
@@ -224,16 +283,14 @@ class MainWindow(QMainWindow):
         self.list.setFixedWidth(132)
         self.list.setAccessibleName("Pages")
         self.stack = QStackedWidget()
-        for number, page in enumerate(self.pages, 1):
-            known = cast(Page, page)
+        for place, (name, known) in enumerate(_PAGES.items()):
             self.list.addItem(known.title)
-            self.list.item(number - 1).setToolTip(f"{known.title} ({known.shortcut})")
-            self.stack.addWidget(page)
+            self.list.item(place).setToolTip(f"{known.title} ({known.shortcut})")
+            self.stack.addWidget(vars(self).get(name) or QWidget())
             key = QAction(self)
             key.setShortcut(QKeySequence(known.shortcut))
-            key.triggered.connect(lambda _=False, page=page: self.show_page(page))
+            key.triggered.connect(lambda _=False, row=place: self.list.setCurrentRow(row))
             self.addAction(key)
-        self.list.currentRowChanged.connect(self.stack.setCurrentIndex)
         self.list.currentRowChanged.connect(self._page_changed)
         side = QVBoxLayout()
         side.setContentsMargins(0, 0, 0, 0)
@@ -314,17 +371,6 @@ class MainWindow(QMainWindow):
         self.compilation.failed.connect(lambda words: run.alarms.add("warning", words))
         self.planner.progressed.connect(self.sequence_page.preview.show_progress)
         self.sequence_page.show_run.connect(lambda: self.show_page(run))
-        self.recordings_page.open_sequence.connect(self._read_sequence)
-        self.study_page.open_sequence.connect(self._play_sequence)
-        self.study_page.show_model.connect(self._show_model)
-        self.study_page.study_finished.connect(self.follow_page.model.find_studies)
-        self.study_page.study_finished.connect(self.follow_page.hold.model.find_studies)
-        self.follow_page.play_sequence.connect(self._play_file)
-        self.follow_page.use_model.connect(run.show_model)
-        self.follow_page.hold.play_hold.connect(self._play_hold)
-        run.started.connect(self.follow_page.hold.watch)
-        run.runner.ended.connect(self.follow_page.hold.run_ended)
-        self.follow_page.waits.connect(run.follow_button.setVisible)
         self.campaign_page.show_recording.connect(self._show_recording)
         run.show_follow.connect(lambda: self.show_page(self.follow_page))
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
@@ -346,7 +392,14 @@ class MainWindow(QMainWindow):
 
     @Slot(int)
     def _page_changed(self, row: int) -> None:
+        self.stack.setCurrentWidget(self._page(row))
         self.session.settings.setValue("page", row)
+
+    @Slot(object)
+    def _study_finished(self, _finished: object) -> None:
+        for page in self._made("follow_page"):
+            page.model.find_studies()
+            page.hold.model.find_studies()
 
     @Slot(Path)
     def _show_recording(self, path: Path) -> None:
@@ -413,8 +466,8 @@ class MainWindow(QMainWindow):
         if not self.restoreGeometry(kept_bytes(settings, "geometry")):
             self._default_geometry()
         # the first start shows the Run page: a simulated rig is ready to be armed
-        row = kept_number(settings, "page", self.pages.index(self.run_page))
-        self.list.setCurrentRow(min(max(row, 0), len(self.pages) - 1))
+        row = kept_number(settings, "page", self.stack.indexOf(self.run_page))
+        self.list.setCurrentRow(min(max(row, 0), len(_PAGES) - 1))
 
     def _default_geometry(self) -> None:
         available = QGuiApplication.primaryScreen().availableSize()

@@ -9,7 +9,7 @@ import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, HELD, INERTIA, UNIFORM
 from dearig.model.effects import MEMORY
-from dearig.model.jit import allocating, inlined, jit
+from dearig.model.jit import allocating, inlined, jit, read_only
 from dearig.model.kernel.effect_forces import (
     BREATHES,
     active_effects,
@@ -304,6 +304,37 @@ def _follow(
 
 
 @allocating
+def _drive(
+    c: np.ndarray,
+    time: np.ndarray,
+    voltage: np.ndarray,
+    ends: np.ndarray,
+    air: np.ndarray,
+    y: np.ndarray,
+    stretch: np.ndarray,
+    rate: np.ndarray,
+    fidelity: int,
+) -> tuple[int, int, int]:
+    """Do what ``drive_by_voltage`` does: the arrays it needs, and the loop."""
+    springs = spring_table(c)
+    c = c.copy()
+    acting = active_effects(c)
+    c[INERTIA] += added_inertia(acting, c, y)
+    policy = policy_of(acting, is_swift(c), fidelity)
+    # whoever makes arrays counts their owners, in every call: the loop must not
+    room = Workspace(
+        springs,
+        film_table(c, springs) if policy.exponential else np.zeros(0),
+        np.zeros((2, max(springs.shape[1] - 1, BRANCHES_MAX))),
+        np.zeros((_PROPAGATORS, PROPAGATOR)),
+        np.empty((7, 3, 3)),
+        np.zeros((15, y.shape[0])),
+        y.copy(),
+        np.zeros(5),
+    )
+    return _follow(policy, acting, c, time, voltage, ends, air, y, stretch, rate, room)
+
+
 def drive_by_voltage(
     c: np.ndarray,
     time: np.ndarray,
@@ -330,20 +361,5 @@ def drive_by_voltage(
     are filled with the last stretch that was reached, never with NaN. ``steps`` were taken; a
     sample by the stiff method counts for the explicit steps that take as long.
     """
-    springs = spring_table(c)
-    c = c.copy()
-    acting = active_effects(c)
-    c[INERTIA] += added_inertia(acting, c, y)
-    policy = policy_of(acting, is_swift(c), fidelity)
-    # whoever makes arrays counts their owners, in every call: the loop must not
-    room = Workspace(
-        springs,
-        film_table(c, springs) if policy.exponential else np.zeros(0),
-        np.zeros((2, max(springs.shape[1] - 1, BRANCHES_MAX))),
-        np.zeros((_PROPAGATORS, PROPAGATOR)),
-        np.empty((7, 3, 3)),
-        np.zeros((15, y.shape[0])),
-        y.copy(),
-        np.zeros(5),
-    )
-    return _follow(policy, acting, c, time, voltage, ends, air, y, stretch, rate, room)
+    drive = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
+    return _drive(c, *drive, y, stretch, rate, fidelity)

@@ -7,8 +7,16 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
+import numpy as np
 import pytest
+
+import dearig.model.kernel.drive as drive_kernel
+from dearig.model import film_kernel, kernel
+from dearig.model.actuator import Actuator, Drive, reading_of
+from dearig.model.film import Strip
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 
 #: A kernel of its own file: numba keeps it in the folder that ``jit`` chose.
 KERNEL = """
@@ -136,3 +144,29 @@ def test_without_a_cache_the_hooks_of_the_effects_are_compiled_from_memory(tmp_p
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr
+
+
+def compiled_versions(*modules: ModuleType) -> int:
+    """The number of argument types for which the kernels of ``modules`` are compiled here."""
+    kernels = [v for m in modules for v in vars(m).values() if hasattr(v, "overloads")]
+    return sum(len(k.overloads) for k in kernels)
+
+
+def test_no_kernel_is_compiled_anew_for_arrays_that_cannot_be_written() -> None:
+    """Those of a file cannot be written; whoever fits one first would wait half a minute more."""
+    time = np.linspace(0.0, 0.1, 11)
+    fixed, pulled = time.copy(), 1.0 + time
+    fixed.flags.writeable = pulled.flags.writeable = False
+    drag = (("linear drag", (("drag", 50.0),)),)
+    film = Strip(TABLE_3, effects=drag)
+    thesis = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+    film.simulate(time, 1.0 + time)
+    thesis.simulate(Drive(time, time))
+    before = compiled_versions(film_kernel, drive_kernel)
+    film.simulate(fixed, 1.0 + time)
+    film.simulate(fixed, pulled)
+    for hold in (True, False):
+        drive = Drive(fixed, fixed, hold)
+        thesis.simulate(drive)
+        reading_of(thesis.coefficients(), 0.1, drive, fidelity=kernel.QUICK)
+    assert compiled_versions(film_kernel, drive_kernel) == before
