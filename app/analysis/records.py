@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.analysis.outcomes import Comparison, Published
 from dearig.analysis.quality import driven_by, inspect
@@ -225,7 +225,7 @@ def _air(
     start = recording.time < recording.time[0] + _THERMOMETER
     samples = max(int(np.count_nonzero(start)), 1)
     first = float(values[start].mean())
-    changes = uniform_filter1d(values, samples, mode="nearest") - first
+    changes = scipy.ndimage.uniform_filter1d(values, samples, mode="nearest") - first
     return scale * changes, scale * first - reference
 
 

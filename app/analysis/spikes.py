@@ -12,7 +12,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.noise import Tails, about_rest, tails_of
 
@@ -55,7 +55,8 @@ def spikes(time: np.ndarray, signal: np.ndarray, pull: np.ndarray, quiet: int) -
     # rounding alone moves a reading off its curve by a step
     limit = _OFF_NOISE * tails.limit(_MASKED_WRONGLY / signal.size) + tails.step
     # what the drive may have moved, just now or before, is no spike
-    driven = maximum_filter1d(np.abs(_off(pull)), 2 * _REACH + 1) / float(np.max(np.abs(pull)))
+    driven = scipy.ndimage.maximum_filter1d(np.abs(_off(pull)), 2 * _REACH + 1)
+    driven /= float(np.max(np.abs(pull)))
     moved = _DRIVEN * float(np.ptp(signal)) * driven
     width = math.hypot(tails.scale, tails.step / math.sqrt(12.0))
     off = np.abs(_off(signal))

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.fft import next_fast_len
+import scipy  # loads its parts when they are first used, which a run may never do
 
 __all__ = ["low_pass", "padded_length", "pass_band"]
 
 
 def padded_length(samples: int) -> int:
     """Return a length for transforms of ``samples`` that keeps their ends apart."""
-    return int(next_fast_len(2 * samples, real=True))
+    return int(scipy.fft.next_fast_len(2 * samples, real=True))
 
 
 def pass_band(frequency: np.ndarray, edge: float) -> np.ndarray:

@@ -25,7 +25,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_closing, binary_dilation
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.actuator import NO_AIR, STATUS_WORDS, Actuator, Drive, at_rest, reading_of
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, MODULUS, WIDTH
@@ -308,7 +308,7 @@ class _Job:
         high = (voltage >= self.ceiling - near) & (error > 0.0)
         # a correction of limited bandwidth reaches into what stands at a limit from this near
         width = 2 * math.ceil(0.5 * self.rate / self.bandwidth) + 1
-        stuck = binary_dilation(low | high, np.ones(width, dtype=bool))
+        stuck = scipy.ndimage.binary_dilation(low | high, np.ones(width, dtype=bool))
         return _Pass(u, reading, error, self.inside & ~stuck)
 
     def reading(self, voltage: np.ndarray) -> np.ndarray | None:
@@ -338,7 +338,8 @@ class _Job:
         beyond = self.inside & (np.abs(self.target - found.reading) > tolerance)
         # a film that was let go rings: what it misses with pauses is one part
         width = 2 * math.ceil(0.5 * _PAUSE * self.rate) + 1
-        joined = binary_closing(np.pad(beyond, width), np.ones(width, dtype=bool))[width:-width]
+        pause = np.ones(width, dtype=bool)
+        joined = scipy.ndimage.binary_closing(np.pad(beyond, width), pause)[width:-width]
         beyond |= joined & self.inside
         parts = tuple(self._part(found, first, last) for first, last in _runs(beyond))
         reference = np.where(beyond | ~self.inside, found.reading, self.smooth)

@@ -36,7 +36,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.actuator import Actuator
 from dearig.model.control.bands import low_pass, pass_band
@@ -455,8 +455,8 @@ class Learner:
         """Return where the film is above the reference though nothing pulls: it returns slower."""
         settings = self._settings
         width = max(round(settings.released_s * self._rate), 1)
-        highest = maximum_filter1d(self._now.voltage, width, origin=(width - 1) // 2)
-        away = uniform_filter1d(reading - self.first.reference, width, mode="nearest")
+        highest = scipy.ndimage.maximum_filter1d(self._now.voltage, width, origin=(width - 1) // 2)
+        away = scipy.ndimage.uniform_filter1d(reading - self.first.reference, width, mode="nearest")
         weak = settings.released_part
         least = max(settings.significant * self._noise, weak**2 * float(self.first.reference.max()))
         found = self._inside & (highest <= weak * self._task.limits.voltage) & (away > least)

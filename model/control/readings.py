@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation, maximum_filter1d, median_filter, uniform_filter1d
-from scipy.optimize import minimize_scalar
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.control.learning_settings import LearningSettings
 from dearig.model.noise import READINGS_MIN, about_rest
@@ -101,7 +100,7 @@ def sorted_out(
     if lead.any():
         given = given - mean_without_outliers(given[lead], noise)
     off = given - predicted
-    away = np.abs(off - median_filter(off, settings.spike_readings))
+    away = np.abs(off - scipy.ndimage.median_filter(off, settings.spike_readings))
     spikes = usable & (away > settings.spike * noise)
     stuck = _stuck(given, predicted, noise, rate, settings) & usable
     for mask, words in ((spikes, "spikes"), (stuck, "stuck readings")):
@@ -153,7 +152,7 @@ def _sine(time: np.ndarray, values: np.ndarray, frequency: float, within: float)
         turn = 2.0 * math.pi * of * time
         return np.array([np.cos(turn), np.sin(turn)])
 
-    best = minimize_scalar(
+    best = scipy.optimize.minimize_scalar(
         lambda of: -float(np.sum((waves(of) @ values) ** 2)),
         bounds=(middle - line, middle + line),
         method="bounded",
@@ -173,10 +172,10 @@ def _stuck(
     """Return where the ``reading`` stands still while the film is ``predicted`` to move."""
     width = max(round(settings.stuck_s * rate), 2)
     same = np.concatenate([[False], np.diff(reading) == 0.0]).astype(float)
-    stands = uniform_filter1d(same, width, mode="nearest") > 1.0 - 0.5 / width
-    moves = maximum_filter1d(predicted, width) + maximum_filter1d(-predicted, width)
+    stands = scipy.ndimage.uniform_filter1d(same, width, mode="nearest") > 1.0 - 0.5 / width
+    moves = sum(scipy.ndimage.maximum_filter1d(p, width) for p in (predicted, -predicted))
     found = stands & (moves > settings.moved * noise)
-    return np.asarray(binary_dilation(found, np.ones(width, dtype=bool)))
+    return np.asarray(scipy.ndimage.binary_dilation(found, np.ones(width, dtype=bool)))
 
 
 def bridged(lacking: np.ndarray, known: np.ndarray, usable: np.ndarray) -> np.ndarray:
@@ -211,7 +210,7 @@ def has_jump(
 
 def _differences(values: np.ndarray, width: int, apart: int) -> np.ndarray:
     """Return the differences (N,) of means over ``width`` samples that are ``apart`` samples."""
-    mean = uniform_filter1d(values, width, mode="nearest")
+    mean = scipy.ndimage.uniform_filter1d(values, width, mode="nearest")
     half = apart // 2
     padded = np.pad(mean, (half, apart - half), mode="edge")
     return np.asarray(padded[apart:] - padded[: values.size])

@@ -71,3 +71,17 @@ def test_a_package_that_is_needed_is_noticed() -> None:
     ended = run("h5py", "info", str(SAMPLE))
     assert ended.returncode == 1
     assert "h5py is imported" in ended.stderr
+
+
+def test_a_run_needs_no_filters_of_images() -> None:
+    """``scipy`` itself is small: numba imports it, and its parts are loaded when they are used."""
+    code = (
+        "import sys, dearig.acquisition.overlay, dearig.acquisition.run, "
+        "dearig.analysis.compatibility; print(*sorted(m for m in sys.modules if m.count('.') == 1))"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=200
+    )
+    loaded = set(ended.stdout.split())
+    assert "numba.core" in loaded
+    assert not loaded & {f"scipy.{part}" for part in ("fft", "ndimage", "signal", "special")}
