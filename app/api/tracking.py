@@ -244,7 +244,8 @@ def track(
     iterations : int
         Number of runs that learn from the one before.
     compare : model, result or path, optional
-        Before, play the voltage of this model, such as the thesis's, and that of a linear map.
+        Before, play the voltage of this model, such as the thesis's, and that of a linear map. It
+        is followed in place of ``model`` if its run speaks against that.
     nearest : bool
         Follow the nearest feasible target where the film cannot follow the asked one.
     within_um : float

@@ -68,7 +68,8 @@ def track(
         typer.Option(
             metavar="MODEL.toml",
             help="Before, play the voltage that this model asks for, such as the thesis's fitted "
-            "to the same recordings, and that of a linear map.",
+            "to the same recordings, and that of a linear map. It is followed in place of the "
+            "model if it predicts its run better.",
         ),
     ] = None,
     nearest: Annotated[
