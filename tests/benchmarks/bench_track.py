@@ -21,10 +21,11 @@ Errors are target minus measured, RMS, where the model with the effect can follo
 noise" is the root of the difference of the squares of error and noise, that of all runs together.
 The noise is that of a reading at rest without what is periodic. The floor is the smallest error
 that a voltage was found to leave on the film itself (``track_floor``), with the noise: what no
-learning can take off. "Film" are errors without noise and without what the sensor adds whatever the
-film does: drift, interference, and jumps of the sensor. They tell whether the film itself is where
-it was told to be; a reading that repeats such an error in every run, as those of these rigs do,
-hides that.
+learning can take off. Where the learned error is at most 1.5 times the noise, the floor is not
+computed, and stands for the noise. "Film" are errors without noise and without what the sensor adds
+whatever the film does: drift, interference, and jumps of the sensor. They tell whether the film
+itself is where it was told to be; a reading that repeats such an error in every run, as those of
+these rigs do, hides that.
 
 The first run is of the model that ``dearig track --compare`` has chosen by the run of the thesis's
 model, see ``dearig.analysis.tracking``.
@@ -287,14 +288,17 @@ def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None, *, with
     linear, fitted, first, *learned = ours.runs
     task = task_of(_target(plant, rig), rig)
     truth = Truth(plant, task)
-    best = min(learned, key=lambda run: run.rms)
-    left = truth.floor(model.model, found.reference, found.reachable, [best.voltage])
+    noise = math.sqrt(np.mean([run.noise**2 for run in ours.runs]))
+    errors = [read(run) for run in learned]
+    left = 0.0
+    if errors[-1] > 1.5e6 * noise:
+        best = learned[int(np.argmin(errors))].voltage
+        left = truth.floor(model.model, found.reference, found.reachable, [best])
 
     def of_film(voltage: np.ndarray) -> float:
         moved = truth.film(voltage)
         return math.inf if moved is None else error(moved)
 
-    noise = math.sqrt(np.mean([run.noise**2 for run in ours.runs]))
     at = 0.5 * path.limits.voltage
     film = Rig(plant, noise, _static(plant, at) / at**2, np.random.default_rng(seed))
     pid = _with_pid(film, path) if with_pid else (math.nan, math.nan, (0, 0))
@@ -305,7 +309,7 @@ def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None, *, with
         chosen=not np.array_equal(first.voltage, fitted.voltage), noise=noise * 1e6,
         floor=math.hypot(left, noise) * 1e6, linear=read(linear),
         thesis=read(fitted), diagnosed=read(first),
-        learned=tuple(read(run) for run in learned),
+        learned=tuple(errors),
         pid=pid[0], pid_ahead=pid[1], trials=pid[2],
         model_free=tuple(error(read) for read in Learning(film, path).runs(ITERATIONS)[1:]),
         film=(
