@@ -33,7 +33,7 @@ from dearig.model.control import (
     invert,
     lines_at_rest,
     mean_without_outliers,
-    reading_under,
+    readings_under,
 )
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Sampled, Sequence
@@ -354,25 +354,27 @@ class Tracking:
         """Follow the compared model if its run speaks against the model; return what is said.
 
         The difference of the mean squares of both predictions' errors counts from so many standard
-        errors on as learning asks for: with noise n it is that of 2 (difference of both) n.
+        errors on as learning asks for: with noise n it is that of 2 (difference of both) n. Where
+        the model has a drift or an event of its recordings, it is judged with and without.
         """
         theirs, expected = self._compare, played.expected
         if theirs is None or expected is None:
             return ()
-        found = reading_under(_actuator(self.model, "--model"), self.task, played.voltage)
         known = self.inversion.reachable & np.isfinite(run.measured)
-        apart = (found - expected)[known]
-        mine, other = ((run.measured - row)[known] for row in (found, expected))
-        scatter = 2.0 * run.noise * float(np.sqrt(np.sum(apart**2)))
-        worse = float(np.sum(mine**2) - np.sum(other**2))
-        stands = bool(np.isfinite(found).all())
-        if stands and worse <= LearningSettings().significant * scatter:
-            return ()
+        measured, other = run.measured[known], (run.measured - expected)[known]
+        found = readings_under(_actuator(self.model, "--model"), self.task, played.voltage)
+        off = math.inf
+        for mine in (reading[known] for reading in found):
+            scatter = 2.0 * run.noise * float(np.sqrt(np.sum((mine - expected[known]) ** 2)))
+            worse = float(np.sum((measured - mine) ** 2) - np.sum(other**2))
+            if np.isfinite(mine).all() and worse <= LearningSettings().significant * scatter:
+                return ()
+            off = min(off, float(np.sqrt(np.mean((measured - mine) ** 2))) * 1e6)
         task = replace(self.task, target=self.inversion.reference)
         model = _actuator(theirs, "--compare")
         self._learner = Learner(model, task, alternatives=alternatives_of(theirs))
         self._followed = theirs
-        off, less = (float(np.sqrt(np.mean(row**2))) * 1e6 for row in (mine, other))
+        less = float(np.sqrt(np.mean(other**2))) * 1e6
         return (
             f"the model {self.model.name!r} predicts this run with an error of {off:.3g} um, the "
             f"compared one with {less:.3g} um: the compared model is followed",

@@ -7,7 +7,7 @@ from dearig.model.control.inversion import CAUSES, Inversion, Unreachable, inver
 from dearig.model.control.learning import Learner, Lesson
 from dearig.model.control.learning_settings import LearningSettings
 from dearig.model.control.limits import VoltageLimits
-from dearig.model.control.linear import reading_under
+from dearig.model.control.linear import readings_under
 from dearig.model.control.readings import lines_at_rest, mean_without_outliers
 from dearig.model.control.task import BANDWIDTH, TrackingTask
 
@@ -27,6 +27,6 @@ __all__ = [
     "invert",
     "lines_at_rest",
     "mean_without_outliers",
-    "reading_under",
+    "readings_under",
     "sensitivity_of",
 ]

@@ -15,7 +15,7 @@ from dearig.model.effects.description import Effect
 from dearig.model.errors import ModelError
 from dearig.model.kernel import OK
 
-__all__ = ["Linearised", "level_of", "linearise", "reading_under", "repeatable_part"]
+__all__ = ["Linearised", "level_of", "linearise", "readings_under", "repeatable_part"]
 
 _STEP = 0.02  # of the voltage squared
 _FLOOR = 1e-4  # of the largest gain: what is less is not inverted
@@ -57,14 +57,18 @@ def repeatable_part(model: Actuator) -> Actuator:
     return replace(model, effects=kept)
 
 
-def reading_under(model: Actuator, task: TrackingTask, voltage: np.ndarray) -> np.ndarray:
-    """Return what the repeatable part of ``model`` reads in m under a ``voltage`` (N,) V.
+def readings_under(model: Actuator, task: TrackingTask, voltage: np.ndarray) -> list[np.ndarray]:
+    """Return what ``model`` reads in m, zeroed in the lead-in, under a ``voltage`` (N,) V.
 
-    It is infinite where the film does not stand that voltage.
+    The first item (N,) is of its repeatable part, the second, if it has more, of all its effects. A
+    model that does not stand that voltage reads infinity.
     """
-    c, drive = repeatable_part(model).coefficients(), Drive(task.time, voltage, hold=True)
-    reading, status = reading_of(c, model.film.length, drive, task.lag)
-    return reading if status == OK else np.full(voltage.size, np.inf)
+    drive, found = Drive(task.time, voltage, hold=True), []
+    for one in dict.fromkeys((repeatable_part(model), model)):
+        reading, status = reading_of(one.coefficients(), one.film.length, drive, task.lag)
+        rest = float(np.mean(reading[: task.lead_in])) if task.lead_in else 0.0
+        found.append(reading - rest if status == OK else np.full(voltage.size, np.inf))
+    return found
 
 
 def _is_repeatable(effect: Effect) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dearig.model.actuator import Drive
-from dearig.model.control import TrackingTask, VoltageLimits, invert
+from dearig.model.control import TrackingTask, VoltageLimits, invert, readings_under
 from dearig.model.control.linear import repeatable_part
 from dearig.model.errors import ModelError
 from dearig.model.stability import pull_in_voltage, static_stretch
@@ -177,3 +177,14 @@ def test_a_sensor_that_reads_nothing_of_some_frequencies_makes_no_voltage_ring()
         for model in (averaging, THESIS)
     )
     assert with_it.max() < 3.0 * without.max()
+
+
+def test_a_drift_of_the_recordings_is_read_with_and_without():
+    drifting = with_effect(THESIS, "slowing drift", numbers("slowing drift", 10.0))
+    wanted = task(path())
+    voltage = invert(THESIS, wanted).voltage
+    [plain] = readings_under(THESIS, wanted, voltage)
+    without, with_it = readings_under(drifting, wanted, voltage)
+    np.testing.assert_allclose(without, plain, atol=1e-9)
+    assert np.abs(with_it - plain)[-1] > 1e-6
+    assert with_it[:LEAD_IN].mean() == pytest.approx(0.0, abs=1e-12)
