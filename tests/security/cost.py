@@ -6,6 +6,9 @@ standard input. Linux only: elsewhere a process cannot limit its memory.
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import io
 import json
 import os
 import resource
@@ -15,7 +18,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,7 +62,7 @@ class Measured:
         return Cost(answer["code"], out, err, answer["seconds"], used)
 
 
-@contextmanager
+@contextlib.contextmanager
 def measuring() -> Iterator[Measured]:
     """Give a runner of commands while the body runs."""
     server = subprocess.Popen(
@@ -99,21 +101,24 @@ def _serve() -> None:
 
 
 def _import_commands() -> None:
-    """Import what commands import when they run, so that a fork costs only its own work."""
-    import openpyxl  # noqa: F401
-    import rich.table  # noqa: F401
+    """Load what commands load when they run, so that a fork costs only its own work."""
+    for name in (
+        "dearig.acquisition.check", "dearig.acquisition.replay", "dearig.acquisition.run",
+        "dearig.analysis.diagnose", "dearig.analysis.identify", "dearig.analysis.simulate",
+        "dearig.analysis.validate", "dearig.api", "dearig.batch.notify",
+        "dearig.config.campaignfile", "dearig.recording.importers.mat_file",
+        "dearig.recording.importers.tdms_file", "dearig.recording.importers.text_file",
+        "dearig.recording.verify", "dearig.report.as_json", "dearig.report.diagnosis_page",
+        "dearig.report.html", "openpyxl", "pyqtgraph", "rich.progress", "rich.table",
+    ):  # fmt: skip
+        importlib.import_module(name)
+    from dearig.cli.main import app
+    from dearig.model.actuator import Actuator
+    from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 
-    import dearig.acquisition.check
-    import dearig.acquisition.run
-    import dearig.analysis.diagnose
-    import dearig.analysis.simulate
-    import dearig.api
-    import dearig.cli.main
-    import dearig.recording.importers.mat_file
-    import dearig.recording.importers.tdms_file
-    import dearig.recording.importers.text_file
-    import dearig.recording.verify
-    import dearig.report.html  # noqa: F401
+    Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3).rest()  # loads the compiler and its kernels
+    with contextlib.redirect_stdout(io.StringIO()):
+        app(["presets"], prog_name="dearig", standalone_mode=False)
 
 
 def _run(asked: dict[str, str]) -> None:
