@@ -16,7 +16,6 @@ __all__ = ["Proposal", "proposals"]
 #: Films from which their scatter is known within a factor of two, with a probability of 91 %: the
 #: chi-square with 4 degrees of freedom is between 4/2^2 and 4 2^2.
 _FILMS_MIN = 5
-_WIDE = 0.5  # half an interval over its slope, above which a seen effect is poorly known
 
 
 @dataclass(frozen=True)
@@ -94,18 +93,17 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Prop
 
 
 def _least_known(trends: Sequence[Trend]) -> list[Proposal]:
-    """Return the seen effect whose interval is widest for its size."""
+    """Return the effect that is seen by itself only, whose interval is widest for its size."""
     wide = [
         (0.5 * (effect.high - effect.low) / abs(effect.slope), trend.name, effect.column)
         for trend in trends
         for effect in trend.effects
-        if effect.verdict in ("common", "untold", "doubtful") and effect.slope != 0.0
+        if effect.verdict in ("common", "untold", "doubtful")
+        and effect.simultaneous[0] <= 0.0 <= effect.simultaneous[1]
     ]
     if not wide:
         return []
     part, name, column = max(wide, key=lambda each: each[0])
-    if part < _WIDE:
-        return []
     low, high = column.range
     return [
         Proposal(

@@ -18,14 +18,15 @@ from dearig.errors import InputError
 
 __all__ = ["Column", "Design", "columns_in", "days_of_films", "design_of", "films_in"]
 
-#: Label, unit, column of the table, and range below which it counts as hardly varied.
+#: Label, unit, column of the table, and range below which it counts as hardly varied: that of a
+#: room that is held within a standard atmosphere of class 1 (ISO 291: 1 °C and 5 % either way).
 _ENVIRONMENT = (
-    ("temperature", "°C", "temperature_degC", 3.0),
+    ("temperature", "°C", "temperature_degC", 2.0),
     ("humidity", "% RH", "relative_humidity_percent", 10.0),
 )
 _CYCLES = "cycles"
 _SECONDS_A_DAY = 86400.0
-_RIGS_MAX = 8  # more rigs than these are not compared one by one
+_RIGS_MAX = 8  # each is a row of every number in the table, which is to be read
 #: Part of a column's variance that the columns before it explain, above which it is left out: its
 #: interval would be ten times as wide as by itself.
 _CONFOUNDED = 0.99

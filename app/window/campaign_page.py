@@ -39,7 +39,7 @@ from dearig.window.campaign_plan import (
 )
 from dearig.window.campaign_table import CampaignTable, QueueRows, rows_of_plan
 from dearig.window.campaign_thread import CampaignRequest, CampaignThread
-from dearig.window.campaign_words import counted, obstacle, plan_words, runs_text
+from dearig.window.campaign_words import counted, killed_words, obstacle, plan_words, runs_text
 from dearig.window.document import TextFile
 from dearig.window.hv import HighVoltage
 from dearig.window.hv_status import Reading
@@ -269,11 +269,7 @@ class CampaignPage(QWidget):
         self._folder, self._queue, self._rows = found.folder, found.queue, QueueRows()
         self._soon = found.queue
         self.message.show_text(
-            "The program ended while the campaign went on. What it left open is settled when it is "
-            "started again."
-            if found.status == "killed"
-            else "",
-            "warn",
+            killed_words(found.queue) if found.status == "killed" else "", "warn"
         )
         self.controls.forget_proposal()
         self._sizes = {}
@@ -310,9 +306,12 @@ class CampaignPage(QWidget):
         except InputError as error:
             self._fail(str(error))
         queue = self._soon
-        self.table.show_rows(self._rows.of(queue, self._sizes))
+        is_played = self._thread is not None
+        self.table.show_rows(self._rows.of(queue, self._sizes, is_played))
         self.headline.setText(counted(queue))
         left = f"{duration_text(queue.time_left)} are left" if queue.waiting else "No run waits"
+        if not is_played and queue.running is not None:
+            left = f"Run {queue.running.name} was cut off · {left}"
         soon = "ends" if queue.ending else "pauses" if queue.paused else ""
         asked = f" · {soon} after this run" if soon and self._queue.running is not None else ""
         where = "" if self._folder is None else f" · {self._folder}"

@@ -38,6 +38,7 @@ _NUMBERS = 3  # of a run that are shown; the tooltip has all
 _STATES = {
     WAITING: ("waiting", ""),
     RUNNING: ("▶ running", "accent"),
+    "cut off": ("✗ cut off", "warn"),  # no program plays it
     DONE: ("✓ done", "good"),
     LOST: ("✗ lost", "bad"),
     STOPPED: ("✗ stopped", "bad"),
@@ -98,19 +99,23 @@ class QueueRows:
     def __init__(self) -> None:
         self._known: dict[str, tuple[tuple[object, ...], RunRow]] = {}
 
-    def of(self, queue: Queue, sizes: Mapping[str, int]) -> list[RunRow]:
-        """Return the runs of ``queue`` in their order; ``sizes`` are bytes of their recordings."""
-        return [self._row(queue.runs[name], sizes.get(name, 0)) for name in queue.order]
+    def of(self, queue: Queue, sizes: Mapping[str, int], is_played: bool) -> list[RunRow]:
+        """Return the runs of ``queue`` in their order; ``sizes`` are bytes of their recordings.
 
-    def _row(self, run: RunState, size: int) -> RunRow:
-        key = (run.state, run.reason, run.recording, run.extremes, len(run.numbers), size)
+        Where the campaign is not played now, a run without an end was cut off.
+        """
+        return [self._row(queue.runs[name], sizes.get(name, 0), is_played) for name in queue.order]
+
+    def _row(self, run: RunState, size: int, is_played: bool) -> RunRow:
+        state = run.state if is_played or run.state != RUNNING else "cut off"
+        key = (state, run.reason, run.recording, run.extremes, len(run.numbers), size)
         known = self._known.get(run.name)
         if known is not None and known[0] == key:
             return known[1]
         played = run.state in (DONE, LOST, STOPPED) and not run.extremes
         row = RunRow(
             run.name,
-            run.state,
+            state,
             run.duration,
             size,
             _settings(run.settings, run.warm_up),

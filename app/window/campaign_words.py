@@ -9,7 +9,7 @@ from dearig.report.campaign_page import duration_text
 from dearig.window.campaign_plan import PlanSurvey
 from dearig.window.session import Session
 
-__all__ = ["counted", "obstacle", "plan_words", "runs_text"]
+__all__ = ["counted", "killed_words", "obstacle", "plan_words", "runs_text"]
 
 _USED = 0.1  # of a limit: what uses less of it is not named
 
@@ -57,6 +57,28 @@ def counted(queue: Queue) -> str:
         if count
     )  # fmt: skip
     return f"{queue.name}: {runs_text(len(queue.runs))}" + (f", {parts}" if parts else "")
+
+
+def killed_words(queue: Queue) -> str:
+    """Return what happened to a campaign whose program was killed, and what its start does."""
+    run = queue.running
+    if run is None:
+        return "The program ended between two runs. Arm and start the campaign to go on."
+    if run.recorded:
+        return (
+            f"The program ended after run {run.name}, before its results were noted. They are "
+            f"computed when the campaign is started again."
+        )
+    lost = (
+        f"and is repeated, as the plan says (repeat_lost = {queue.repeat_lost})"
+        if run.attempts <= queue.repeat_lost
+        else f"and is not repeated (repeat_lost = {queue.repeat_lost} in the plan)"
+    )
+    return (
+        f"The program ended during run {run.name}. When the campaign is started again, the "
+        f"recording of this run is read: if it is whole, the run is done; otherwise it is lost "
+        f"{lost}."
+    )
 
 
 def obstacle(

@@ -171,7 +171,8 @@ class HighVoltageStatus(QObject):
         """Keep a note of the run, for a start of the program after this one has died in it."""
         self._keep(
             LatchedAlarm(
-                "The program ended during a run",
+                # shown with the time that follows it, which is that of the start
+                "The program ended during what was started",
                 "what is on the output is unknown: switch the amplifier off, and read the log",
                 time.time(),
                 self._session.address,

@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.batch.after import Computed
+from dearig.batch.journal import JOURNAL
 from dearig.batch.watching import seen
 from dearig.config.campaignfile import parse_campaign
 from dearig.config.rigfile import RigFile
@@ -240,6 +241,32 @@ def test_stop_ends_run_and_campaign_at_zero_and_it_goes_on_later(
     begin(qtbot, page)
     ended(qtbot, runner)
     assert states(page) == ["lost", "done", "done"]
+
+
+@pytest.mark.parametrize(
+    ("entries", "state", "words"),
+    [
+        (3, "cut off", "ended during run few-0001. When the campaign is started again"),
+        (4, "cut off", "ended after run few-0001, before its results were noted"),
+        (5, "done", "ended between two runs"),
+    ],
+)
+def test_a_killed_campaign_says_what_happened_and_what_its_start_does(
+    qtbot: QtBot, page: CampaignPage, runner: Runner, entries: int, state: str, words: str
+) -> None:
+    begin(qtbot, page)
+    ended(qtbot, runner)
+    folder = page.folder
+    assert folder is not None
+    journal = folder / JOURNAL
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:entries]))
+    page._new()
+    page.open_campaign(folder)
+    qtbot.waitUntil(lambda: page.folder == folder, timeout=_PATIENCE)
+    surveyed(qtbot, page)
+    assert states(page)[0] == state
+    assert words in page.message.text()
+    assert ("few-0001 was cut off" in page.summary.text()) == (state == "cut off")
 
 
 def test_an_interlock_halts_until_a_person_says_what_was_seen(

@@ -172,7 +172,7 @@ def test_the_alarm_of_a_real_rig_outlives_the_program(session: Session) -> None:
     status = HighVoltageStatus(again)
     assert status.state is HighVoltage.UNKNOWN
     assert status.alarm is not None
-    assert "ended during a run" in status.alarm.headline
+    assert "ended during what was started" in status.alarm.headline
     assert again.blocks
     status.acknowledge("Ada")
     assert not again.blocks
