@@ -41,12 +41,10 @@ __all__ = ["Notifier", "await_notifications"]
 log = logging.getLogger(__name__)
 
 FORMAT = "dearig-notification/1"
-#: Time in s after which a command is killed, and after which no answer of a webhook is awaited.
-COMMAND_LIMIT, WEBHOOK_LIMIT = 30.0, 10.0
-#: Notifications under way at once, at most: runs may end faster than notifications are delivered.
+#: Notifications under way at once, at most, since runs may end faster than they are delivered: of
+#: command and webhook one that is late, and the next one.
 UNDER_WAY_MAX = 4
-#: Bytes of what a failed command wrote that are logged.
-_TOLD = 300
+_TOLD = 300  # bytes of what a failed command wrote that are logged: some three lines
 
 
 def _of_run(
@@ -78,12 +76,9 @@ class Notifier:
         self,
         notify: Notify,
         now: Callable[[], float] = time.time,
-        command_limit: float = COMMAND_LIMIT,
-        webhook_limit: float = WEBHOOK_LIMIT,
     ) -> None:
         self._notify = notify.checked()
         self._now = now
-        self._command_limit, self._webhook_limit = command_limit, webhook_limit
         self._failing: set[str] = set()
 
     def tell(
@@ -112,7 +107,7 @@ class Notifier:
             self._start("webhook", lambda: self._call(body))
 
     def _has_place(self, event: Event) -> bool:
-        _under_way[:] = [thread for thread in _under_way if thread.is_alive()]
+        _under_way[:] = [each for each in _under_way if each[0].is_alive()]
         # never dropped: no later notification follows the end of a queue
         if len(_under_way) < UNDER_WAY_MAX or event == "queue-stopped":
             return True
@@ -122,7 +117,7 @@ class Notifier:
     def _start(self, name: str, work: Callable[[], None]) -> None:
         # a daemon: the end of the program does not wait for a server that never answers
         thread = threading.Thread(target=work, name=f"notify {name}", daemon=True)
-        _under_way.append(thread)
+        _under_way.append((thread, time.monotonic() + self._notify.timeout))
         thread.start()
 
     def _failed(self, what: str, why: str) -> None:
@@ -206,14 +201,14 @@ class Notifier:
     ) -> None:
         with said:
             try:
-                process.communicate(body, self._command_limit)
+                process.communicate(body, self._notify.timeout)
             except subprocess.TimeoutExpired:
                 _kill(process)
                 if process.stdin is not None:
                     with contextlib.suppress(OSError):  # what it has not read
                         process.stdin.close()
                 process.wait()
-                self._failed(what, f"it was killed after {self._command_limit:g} s")
+                self._failed(what, f"it was killed after {self._notify.timeout:g} s")
                 return
             except OSError as error:
                 _kill(process)
@@ -235,7 +230,7 @@ class Notifier:
             address, body, {"Content-Type": "application/json", "User-Agent": "dearig"}
         )
         try:
-            with _OPENER.open(request, timeout=self._webhook_limit):
+            with _OPENER.open(request, timeout=self._notify.timeout):
                 self._failing.discard(what)
                 return
         except urllib.error.HTTPError as error:
@@ -245,23 +240,24 @@ class Notifier:
             reason = error.reason
             why = one_line(reason) if isinstance(reason, OSError) else "it cannot be reached"
         except TimeoutError:
-            why = f"no answer within {self._webhook_limit:g} s"
+            why = f"no answer within {self._notify.timeout:g} s"
         except (OSError, ValueError, http.client.HTTPException) as error:
             # the words of these errors may have the address in them
             why = type(error).__name__
         self._failed(what, why)
 
 
-#: Threads of the notifications under way in this process.
-_under_way: list[threading.Thread] = []
+#: Threads of the notifications under way in this process, and the monotonic time of their limits.
+_under_way: list[tuple[threading.Thread, float]] = []
 
 
 def await_notifications() -> None:
     """Wait for the notifications under way, within their time limits; ctrl-C ends the wait."""
-    end = time.monotonic() + max(COMMAND_LIMIT, WEBHOOK_LIMIT) + 1.0
+    # a command that was killed takes a moment to end
+    end = max((limit for _, limit in _under_way), default=0.0) + 1.0
     told = False
     with contextlib.suppress(KeyboardInterrupt):
-        for thread in _under_way:
+        for thread, _ in _under_way:
             thread.join(1.0)
             if thread.is_alive() and not told:
                 told = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 from urllib.parse import urlsplit
 
@@ -23,33 +23,19 @@ EVENTS: tuple[Event, ...] = ("run-ended", "tripped", "queue-stopped")
 _VARIABLE = "env:"
 
 
-class NotifyTable(Table):
-    """The table ``[notify]`` of a plan."""
-
-    command: list[str] = Field(
-        default_factory=list, max_length=100, description="a program and its arguments"
-    )
-    webhook: str = Field(
-        default="", description="an address that takes JSON, or env:NAME for a variable with one"
-    )
-    on: list[Event] = Field(default_factory=lambda: list(EVENTS), description="events to report")
-
-    def settings(self) -> Notify:
-        """Return the settings of the table."""
-        return Notify(tuple(self.command), self.webhook, tuple(self.on))
-
-
 @dataclass(frozen=True)
 class Notify:
     """Settings of notifications of the events ``on``: by ``command``, ``webhook``, both or neither.
 
     ``command`` is a program with its arguments, () for none. ``webhook`` is an address, which may
-    be a secret, or ``env:NAME``; "" for none.
+    be a secret, or ``env:NAME``; "" for none. After ``timeout`` s the command is killed, and no
+    answer of the webhook is awaited.
     """
 
     command: tuple[str, ...] = ()
     webhook: str = field(default="", repr=False)
     on: tuple[Event, ...] = EVENTS
+    timeout: float = 30.0
 
     def checked(self) -> Notify:
         """Return the settings with the program's path and the webhook's address.
@@ -68,7 +54,27 @@ class Notify:
                     f"its path, or install it"
                 )
             command = (program, *command[1:])
-        return Notify(command, _address(self.webhook), self.on)
+        return replace(self, command=command, webhook=_address(self.webhook))
+
+
+class NotifyTable(Table):
+    """The table ``[notify]`` of a plan."""
+
+    command: list[str] = Field(
+        default_factory=list, max_length=100, description="a program and its arguments"
+    )
+    webhook: str = Field(
+        default="", description="an address that takes JSON, or env:NAME for a variable with one"
+    )
+    on: list[Event] = Field(default_factory=lambda: list(EVENTS), description="events to report")
+    timeout_s: float = Field(
+        default=Notify.timeout, gt=0.0, le=3600.0, allow_inf_nan=False,
+        description="time for the program, and for the answer of the webhook",
+    )  # fmt: skip
+
+    def settings(self) -> Notify:
+        """Return the settings of the table."""
+        return Notify(tuple(self.command), self.webhook, tuple(self.on), self.timeout_s)
 
 
 def _address(webhook: str) -> str:

@@ -145,7 +145,7 @@ def test_a_command_that_fails_is_logged(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, script: str, words: str | None
 ) -> None:
     command = (sys.executable, "-S", "-c", script)
-    notifier = Notifier(Notify(command), command_limit=0.2 if "sleep" in script else 60.0)
+    notifier = Notifier(Notify(command, timeout=0.2 if "sleep" in script else 60.0))
     notifier.tell("run-ended", "x" * 200_000)  # more than a pipe holds
     await_notifications()
     warnings = [r.message for r in caplog.records if r.levelno >= logging.WARNING]
@@ -220,16 +220,17 @@ def test_keys_of_the_plan_are_checked(bench: Bench) -> None:
     for text in ('on = ["sometimes"]', 'command = "mail me"', "webhok = 1"):
         with pytest.raises(InputError, match="notify"):
             bench.campaign(f"{PLAN}[notify]\n{text}\n")
+    assert bench.campaign(f"{PLAN}[notify]\ntimeout_s = 5\n").notify.timeout == 5.0
     with pytest.raises(InputError, match="is not there"):
         bench.play(f'{PLAN}[notify]\ncommand = ["no-such-program-here"]\n')
     assert not bench.out.exists()
 
 
 def test_options_come_before_the_plan() -> None:
-    plan = Notify(("mail",), "https://example.org/a", ("tripped",))
+    plan = Notify(("mail",), "https://example.org/a", ("tripped",), 5.0)
     assert notify_from(None, None, None, plan) == plan
     changed = notify_from('say "a run" now', None, None, plan)
-    assert changed == Notify(("say", "a run", "now"), "https://example.org/a", ("tripped",))
+    assert changed == Notify(("say", "a run", "now"), "https://example.org/a", ("tripped",), 5.0)
     with pytest.raises(InputError, match="quote"):
         notify_from('say "a run', None, None, plan)
 

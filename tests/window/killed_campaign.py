@@ -90,6 +90,15 @@ def play(folder: Path, port: int, picture: str) -> None:
     window.show_page(page)
 
     def click(widget: QWidget) -> None:
+        until(widget.isEnabled, "what is clicked is offered")
+        place: list[tuple[int, int]] = []
+
+        def rests() -> bool:
+            """Return True once the widget has not moved for some looks."""
+            place.append(widget.mapToGlobal(QPoint()).toTuple())
+            return len(place) > 30 and len(set(place[-30:])) == 1
+
+        until(rests, "the layout rests")
         hand.click(widget.mapToGlobal(QPoint(12, widget.height() // 2)))
 
     def write(field: QLineEdit, word: str) -> None:
