@@ -57,11 +57,13 @@ def estimates_with_intervals(
     held: np.ndarray,
     report: Callable[[float], None],
     lower_ends: bool = True,
+    which: np.ndarray | None = None,
 ) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
     """Return estimates at ``values`` (d,) with 95 % intervals, and names and covariance (f, f).
 
     ``held`` (d,) bool are parameters that were not fitted; with ``lower_ends`` each locking limit
     among them is freed alone for its own lower end. ``problem`` has its optimum near ``values``.
+    Only the parameters ``which`` (d,) bool get an estimate, where it is given.
     ``report`` receives the fraction that is done, at each point of a profile. The covariance, in SI
     units, is that of the parameters that were fitted.
     """
@@ -74,17 +76,18 @@ def estimates_with_intervals(
     chi2 = centre.cost * problem.samples
     ends = at_bound(layout, layout.coordinates(values))
     estimates = []
-    for j, q in enumerate(layout.quantities):
-        value = float(values[j])
+    wanted = [j for j in range(layout.size) if which is None or which[j]]
+    for place, j in enumerate(wanted):
+        q, value = layout.quantities[j], float(values[j])
         if held[j] and not (lower_ends and q.kind == "J"):
             estimates.append(Estimate(q.name, q.unit, value, 0.0, math.inf, False, "held"))
             continue
         points = count(1)
 
-        def tick(before: int = j, points: Iterator[int] = points) -> None:
+        def tick(before: int = place, points: Iterator[int] = points) -> None:
             # how many points a profile takes is not known: four are the rule
             part = 1.0 - 0.5 ** (next(points) / 2.0)
-            report((before + part) / layout.size)
+            report((before + part) / len(wanted))
 
         sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already at its upper end
         low, high = profile(problem, centre.x, chi2, j, jac, inflation, held, tick, sides)

@@ -10,19 +10,23 @@ import numpy as np
 from scipy.special import kolmogorov
 
 from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
 
 __all__ = [
     "CHI2_95",
     "correlation_time",
     "covariance",
+    "firm_directions",
     "has_spectrum_of",
     "is_flat",
+    "linear_widths",
     "profile",
     "unevenness",
 ]
 
 CHI2_95 = 3.841458820694124  #: 95 % of chi-square with one degree of freedom
+_NORMAL_95 = math.sqrt(CHI2_95)
 #: Least eigenvalue of a normal matrix, in units of its diagonal, of a direction that the data
 #: determine. Derivatives by differences are known to some 1e-5; a smaller eigenvalue is the square
 #: of their error.
@@ -119,6 +123,43 @@ def _inverse(normal: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.n
 def _pseudo_inverse(normal: np.ndarray) -> np.ndarray:
     """Return the inverse of ``normal`` (f, f), 0 along directions that are not determined."""
     return _inverse(normal, lambda w: np.where(w > _TOLD, 1.0 / np.maximum(w, _TOLD), 0.0))
+
+
+def firm_directions(
+    jacobian: np.ndarray, values: np.ndarray, layout: Layout, free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return directions (f, m) in which intervals are linear, and which parameters (d,) are not.
+
+    ``jacobian`` (N, f) is that at the natural ``values`` (d,), over the ``free`` (d,) parameters.
+    Along the other directions an interval reaches as far as a parameter itself: there chi-square is
+    no parabola, and no derivative says how wide the interval is. The parameters (d,) bool are those
+    that such a direction moves beyond their own linear interval, though not as far as themselves.
+    """
+    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    _, singular, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
+    own = np.where([q.logarithmic for q in layout.quantities], 1.0, np.abs(values))[free]
+    reach = _NORMAL_95 * np.abs(rows) / np.maximum(singular, 1e-300)[:, None] / scale
+    firm = ~(reach >= own).any(axis=1)
+    whole = np.sqrt(np.sum(reach[firm] ** 2, axis=0))
+    farthest = np.max(reach[~firm], axis=0, initial=0.0)
+    bent = np.zeros(free.size, dtype=bool)
+    bent[free] = (farthest > whole) & (farthest < own)
+    return np.asarray(rows[firm].T / scale[:, None]), bent
+
+
+def linear_widths(exact: np.ndarray, other: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Return widths of linear intervals by the Jacobian ``other``, over those by ``exact``.
+
+    Both Jacobians are (N, f), and intervals are along the ``directions`` (f, m). A width is given
+    for each parameter that they move.
+    """
+    variances = []
+    for jacobian in (exact, other):
+        moved = jacobian @ directions
+        inverse = np.linalg.pinv(moved.T @ moved)
+        variances.append(np.einsum("ij,jk,ik->i", directions, inverse, directions))
+    seen = variances[0] > 0.0
+    return np.asarray(np.sqrt(variances[1][seen] / variances[0][seen]))
 
 
 @dataclass(frozen=True)

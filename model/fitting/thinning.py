@@ -11,18 +11,23 @@ from dearig.model.records import ActuatorRecord
 __all__ = ["thinned"]
 
 _MISFIT_MAX = 0.02  # of a mean's variance: what thinning may add to the misfit of a true model
+_MISFIT_CORRECTED = 1.0  # the same, where the difference is corrected afterwards
 _RATE_FACTOR = 1.5  # by which a rate that is too low is raised
 # of the fourth difference of means: error of a curve corrected by the second difference
 _CURVATURE_ERROR = 17.0 / 5760.0
 
 
-def thinned(record: ActuatorRecord, rate: float, model: Actuator) -> ActuatorRecord:
+def thinned(
+    record: ActuatorRecord, rate: float, model: Actuator, corrected: bool = False
+) -> ActuatorRecord:
     """Return ``record`` in means at about ``rate`` Hz, or as much above as accuracy asks for.
 
     The simulation of the means by ``model`` must equal the means of its simulation of the readings
     within a part of the noise, and the readings must not curve more between means than that. The
-    first test is left out where the simulation fails.
+    first test is left out where the simulation fails. With ``corrected`` the difference may be as
+    large as the noise: the caller takes it off (``dearig.model.fitting.estimates.recentre``).
     """
+    allowed = _MISFIT_CORRECTED if corrected else _MISFIT_MAX
     simulated: np.ndarray | None = None
     while True:
         thin = record.coarse(rate)
@@ -40,7 +45,7 @@ def thinned(record: ActuatorRecord, rate: float, model: Actuator) -> ActuatorRec
         if of_means is None:
             continue
         means = simulated[: thin.time.size * every].reshape(-1, every).mean(axis=1)
-        if _mean_square(of_means - means, thin) < _MISFIT_MAX:
+        if _mean_square(of_means - means, thin) < allowed:
             return thin
 
 
