@@ -21,7 +21,7 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words, one_line
-from dearig.recording.importers.cells import complaint_about, number_in
+from dearig.recording.importers.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.columns import unseen
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import PARSER_FAILURES, listing, printable
@@ -162,17 +162,26 @@ class _Sheet:
         return frozenset(found)
 
     def _read(self) -> dict[int, array[float]]:
-        numbers = {column.place: array("d") for column in self.layout.columns}
+        columns = [self._ordered(column) for column in self.layout.columns]
+        numbers = {column.place: array("d") for column in columns}
         for index, row in enumerate(self._rows(ROWS_MAX, values=True)):
             if (at := index - self.layout.first) < 0:
                 continue
-            for column in self.layout.columns:
+            for column in columns:
                 cell = row[column.place] if column.place < len(row) else None
                 number, wrong = _number(cell, column)
                 numbers[column.place].append(number)
                 if wrong and len(self._wrong) < TOLD_MAX:
                     self._wrong[column.place, at] = wrong
         return numbers
+
+    def _ordered(self, column: Column) -> Column:
+        """Return ``column`` with the order of day and month that all its texts say."""
+        if not column.is_open:
+            return column
+        cells = (row[column.place] for row in self._rows(ROWS_MAX, values=True)
+                 if column.place < len(row))  # fmt: skip
+        return with_order(column, (cell.strip() for cell in cells if isinstance(cell, str)))
 
     def _rows(self, most: int, values: bool) -> Iterator[Sequence[Cell]]:
         """Yield the first ``most`` rows; of formulas, their ``values`` or themselves."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.importers.chosen import LIKELY, Chosen, Pick, own_name
+from dearig.recording.importers.clock_numbers import by_sixties, epoch_unit
 from dearig.recording.importers.labels import (
     DIMENSIONS,
     RAW,
@@ -89,7 +90,7 @@ class Guess:
         names = [n for n in names if values[n].size]
         step = getattr(source, "step_s", None)
         timed = self._timed or (step is not None and step(names) is not None)
-        if "time" not in there and timed:
+        if "time" in there or timed:
             names = [n for n in names if not _counts(values[n])]
         elif "time" not in there:
             rising = [n for n in names if bool((np.diff(values[n]) > 0.0).all())]
@@ -119,8 +120,10 @@ class Guess:
         """Propose ``column`` for the target ``name``; ``output``: in volts of an instrument."""
         target = target_of(name)
         label = self._labels[column]
-        foreign = output or (
-            bool(label.unit) and DIMENSIONS[target.quantity] not in label.dimensions
+        foreign = (
+            output
+            or bool(label.unknown)
+            or (bool(label.unit) and DIMENSIONS[target.quantity] not in label.dimensions)
         )
         if label.unit and not foreign:
             target = target_of(target_name(target.quantity, label.unit))
@@ -184,10 +187,13 @@ class Guess:
             )
             self._propose_scaled(target_of(likely), column)
         elif not label.unit and DIMENSIONS[quantity] not in ("strain", "stretch"):
-            likely = LIKELY[DIMENSIONS[quantity]]
+            likely, why = self._unit_by_values(quantity, column)
             target = target_of(target_name(quantity, likely))
-            self._chosen.unsure.append(f"{column!r} names no unit")
-            self._pick(target, column, target.scale, doubt or "unit")
+            if why:
+                self._chosen.notes.append(f"{column!r} {why}")
+            else:
+                self._chosen.unsure.append(f"{column!r} names no unit")
+            self._pick(target, column, target.scale, doubt or ("" if why else "unit"))
         else:
             target = target_of(target_name(quantity, label.unit or "1"))
             if quantity == "strain" and not label.unit:
@@ -196,6 +202,16 @@ class Guess:
                 )
             open_unit = quantity == "strain" and not label.unit
             self._pick(target, column, target.scale, doubt or ("unit" if open_unit else ""))
+
+    def _unit_by_values(self, quantity: str, column: str) -> tuple[str, str]:
+        """Return the likely unit of a column that names none, and why if it is sure."""
+        likely = LIKELY[DIMENSIONS[quantity]]
+        if quantity != "time":
+            return likely, ""
+        values = self._chosen.source.read([column])[column]
+        if unit := epoch_unit(values):
+            return unit, f"counts from 1970 in {unit}, by its values"
+        return "min" if by_sixties(values) is not None else likely, ""
 
     def _of_unit(self, quantity: str) -> list[str]:
         """Return the one free column with a unit of ``quantity``, or the only one that is left.

@@ -15,11 +15,12 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
-from dearig.recording.importers.cells import complaint_about, number_in
+from dearig.recording.importers.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.importer import Importer
+from dearig.recording.importers.moments import moment_of
 from dearig.recording.importers.source import printable
 from dearig.recording.importers.stored import Stored, StoredColumns
-from dearig.recording.importers.text_layout import Column, encoding_of, moment_of
+from dearig.recording.importers.text_layout import Column, encoding_of
 
 __all__ = ["IMPORTER", "JsonFile"]
 
@@ -309,6 +310,8 @@ def _numbers(values: Sequence[Json]) -> np.ndarray:
         except OverflowError:
             pass  # of a whole number without end, which is found below
     column = next((c for value in values if (c := _column_of(value)) is not None), _PLAIN)
+    if column.since is not None:
+        column = with_order(column, (v.strip() for v in values if isinstance(v, str)))
     return np.array([_number(value, column) for value in values], dtype=np.float64)
 
 

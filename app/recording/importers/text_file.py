@@ -21,7 +21,7 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
-from dearig.recording.importers.cells import complaint_about, number_in
+from dearig.recording.importers.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.columns import NamedColumns, Overview
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import GapError, NeedsOptionError, no_such_column
@@ -156,7 +156,7 @@ class TextFile(NamedColumns[Column]):
         return found
 
     def _read_section(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        wanted = [self._columns[name] for name in dict.fromkeys(names)]
+        wanted = [self._ordered(name) for name in dict.fromkeys(names)]
         self.skipped, self._spans, self._wanted = [], [], wanted
         table = _Table(len(wanted))
         size = left = self._size
@@ -165,6 +165,25 @@ class TextFile(NamedColumns[Column]):
             left -= len(block)
             self.progress(1.0 - max(left, 0) / size)
         return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
+
+    def _ordered(self, name: str) -> Column:
+        """Return the column ``name``, with the order of day and month that the whole file says."""
+        column = self._columns[name]
+        if column.is_open:
+            column = replace(with_order(column, self._cells(column.place)), is_open=False)
+            self._columns[name] = column
+        return column
+
+    def _cells(self, place: int) -> Iterator[str]:
+        """Yield the cells at ``place`` of all lines of the table."""
+        for _, block in self._blocks():
+            for line in block.decode("utf-8", "replace").split("\n"):
+                try:
+                    cells = cells_of(line, self.layout.delimiter)
+                except csv.Error:
+                    continue
+                if place < len(cells):
+                    yield cells[place]
 
     def overview(self, names: Sequence[str], count: int) -> dict[str, Overview]:
         """Return the first ``count`` values of columns, how many there are, and their range.

@@ -14,11 +14,12 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 
 from dearig.errors import InputError
 from dearig.recording.importers.labels import has_east_asian_name
+from dearig.recording.importers.moments import day_first_or_open, is_open_date, moment_of
 from dearig.recording.importers.text_numbers import Signs, is_number, signs_of
 from dearig.recording.importers.units import unit_of
 
@@ -31,7 +32,6 @@ __all__ = [
     "holds_data",
     "is_row",
     "layout_of",
-    "moment_of",
 ]
 
 #: Characters from the start in which the layout is looked for: blocks of parameters are short.
@@ -60,7 +60,8 @@ class Column:
     ``own`` is its name without ``group``, the specimen or table that it belongs to where there are
     several side by side, and without the place behind a repeated name. ``decimal`` is the sign
     before decimals, ``thousands`` that between groups of digits, or empty. ``since`` is the first
-    moment of a column of dates and times of day, which is read in s from it.
+    moment of a column of dates and times of day, which is read in s from it. ``day_first`` is the
+    order in its dates, which ``is_open`` where their form does not say it: then all of them do.
     """
 
     name: str
@@ -71,6 +72,8 @@ class Column:
     since: datetime | None = None
     group: str = ""
     own: str = ""
+    day_first: bool = True
+    is_open: bool = False
 
 
 @dataclass(frozen=True)
@@ -132,41 +135,6 @@ def cells_of(line: str, delimiter: str | None) -> list[str]:
         return [cell.strip() for cell in line.split(delimiter)]
     reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
     return [cell.strip() for cell in next(reader)]
-
-
-def moment_of(cell: str) -> datetime | None:
-    """Return the date and time of day in ``cell``; None if it is something else."""
-    if ":" not in cell or not cell[:1].isdigit():
-        return None
-    text = cell.replace(",", ".")
-    if match := _CLOCK.fullmatch(text):
-        hours, minutes, seconds = match.groups()
-        if hours is None and "." not in seconds:
-            return None  # it may be hours and minutes
-        return _MIDNIGHT + timedelta(
-            hours=int(hours or 0), minutes=int(minutes), seconds=float(seconds)
-        )
-    try:
-        return datetime.fromisoformat(text.replace("/", "-"))
-    except ValueError:
-        pass
-    for form in _MOMENTS:
-        try:
-            return datetime.strptime(text, form)
-        except ValueError:
-            continue
-    return None
-
-
-#: A time of day, or a time since the start, which may have many hours or none.
-_CLOCK = re.compile(r"(?:(\d{1,5}):)?([0-5]?\d):([0-5]\d(?:\.\d+)?)")
-_MIDNIGHT = datetime(1900, 1, 1)  # as strptime has it
-_MOMENTS = (
-    "%m/%d/%Y %I:%M:%S.%f %p", "%m/%d/%Y %I:%M:%S %p",
-    "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d.%m.%y %H:%M:%S.%f", "%d.%m.%y %H:%M:%S",
-    "%I:%M:%S.%f %p", "%I:%M:%S %p",
-    "%Y-%m-%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S",
-)  # fmt: skip
 
 
 def layout_of(
@@ -401,7 +369,14 @@ class _Table:
             unit = units[place] if place < len(units) else ""
             group, of = groups[place], signs.get(place, Signs())
             if place in timed:
-                found.append(Column(name, place, "s", since=timed[place], group=group))
+                first = day_first_or_open(column)
+                since = next(filter(None, (moment_of(cell, first) for cell in column)), None)
+                found.append(
+                    Column(
+                        name, place, "s", since=since or timed[place], group=group,
+                        day_first=first, is_open=any(map(is_open_date, column)),
+                    )
+                )  # fmt: skip
                 continue
             if of.open and of.decimal == ",":
                 cell = next(cell for cell in column if "," in cell)

@@ -95,7 +95,7 @@ ALIASES = MappingProxyType(
             "min": "mins minute minutes minuten Min",
             "h": "hr hrs hour hours std stunden heure heures",
             "d": "day days tag tage jour jours",
-            "V": "volt volts Volt Volts v",
+            "V": "volt volts Volt Volts v VDC Vdc",
             "kV": "kv KV kilovolt kilovolts Kilovolt",
             "mV": "millivolt millivolts",
             "m": "meter meters metre metres",

@@ -11,6 +11,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.importers.chosen import Chosen, Pick
+from dearig.recording.importers.clock_numbers import by_sixties
 from dearig.recording.importers.labels import names_of, suggestion
 from dearig.recording.importers.source import GapError, NeedsOptionError, listing
 from dearig.recording.importers.specimen import Specimen, specimen_told
@@ -213,6 +214,8 @@ def _read(
     good = _good_rows(chosen, table, names, skip)
     if not good.all():
         table = {q: column[good] for q, column in table.items()}
+    if "time" in picked:
+        table["time"] = _counted_by_sixties(chosen, picked["time"], table["time"], values)
     found = {
         q: picked[q].scale.apply(column) if q in picked else column for q, column in table.items()
     }
@@ -224,6 +227,34 @@ def _read(
         values.notes.append(f"time is counted from the first time stamp, {first:.3f} s")
     _note_left_out(chosen, values, good)
     return found
+
+
+def _counted_by_sixties(chosen: Chosen, pick: Pick, time: np.ndarray, values: Values) -> np.ndarray:
+    """Return ``time`` (n,) in the unit of ``pick``; 40.59 min may be 40 min and 59 s.
+
+    Changes the notes. Raises ``NeedsOptionError`` where the column's unit is none of which sixty
+    make the next. A scale that the user gave says that the numbers are plain.
+    """
+    if pick.behind or (counted := by_sixties(time)) is None:
+        return time
+    unit, part = pick.target.unit, {"min": "seconds", "h": "minutes"}.get(pick.target.unit)
+    carried = int(np.flatnonzero(np.diff(np.round(100.0 * time) % 100.0) < 0.0)[0])
+    seen = f"{time[carried + 1]:.2f} follows {time[carried]:.2f}"
+    plain = shlex.quote(f"{pick.target.name}={pick.column}*1")
+    if part is not None:
+        values.notes.append(
+            f"{pick.column!r} is read as {'minutes' if unit == 'min' else 'hours'} and {part}: "
+            f"{seen}, and its steps are even only so; --column {plain} reads plain numbers"
+        )
+        return counted / 60.0
+    step = float(np.median(np.diff(counted)))
+    raise NeedsOptionError(
+        f"{chosen.source.path}: {pick.column!r} is in {unit}, but its values seem to be minutes "
+        f"and seconds: {seen}, and its steps are even only so; give the rate, or --column {plain} "
+        f"if they are plain numbers",
+        "--rate-Hz",
+        f"{1.0 / step:.9g}",
+    )
 
 
 def _read_columns(chosen: Chosen, picked: dict[str, Pick], values: Values) -> dict[str, np.ndarray]:
