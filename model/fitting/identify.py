@@ -47,8 +47,8 @@ _COARSE_SAMPLES = 1500  # of a film record
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
 # Of an interval's width, which means and quicker steps may change: it changes a coverage of 95 %
-# by half a per cent
-_WIDTH_ERROR_MAX = 0.02
+# by a quarter of a per cent
+_WIDTH_ERROR_MAX = 0.01
 # Hz and fidelity of the means for the intervals, the cheapest first
 _LEVELS = (
     (0.5 * _COARSE_RATE, kernel.COARSE),

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import openpyxl
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
@@ -451,3 +452,18 @@ def test_rows_of_a_parquet_file_without_values_are_left_out(tmp_path: Path) -> N
     done = imported(path, skip_bad_rows=True)
     assert any("2 rows were left out" in doubt for doubt in done.doubts)
     np.testing.assert_allclose(open_recording(tmp_path / "out.h5").time, np.delete(TIME, [7, 9]))
+
+
+def test_dates_with_months_first_in_json_and_workbooks(tmp_path: Path) -> None:
+    start = datetime(2024, 4, 12, 23, 59, 58)
+    stamps = [(start + timedelta(seconds=i)).strftime("%m/%d/%Y %H:%M:%S") for i in range(6)]
+    rows = [[s, 100.0 * i, 0.1 * i] for i, s in enumerate(stamps)]
+    names = ["Timestamp", "voltage_V", "displacement_mm"]
+    as_json = tmp_path / "dates.json"
+    as_json.write_text(json.dumps(dict(zip(names, zip(*rows, strict=True), strict=True))))
+    book = openpyxl.Workbook()
+    for row in (names, *rows):
+        book.active.append(row)
+    book.save(tmp_path / "dates.xlsx")
+    for path in (as_json, tmp_path / "dates.xlsx"):
+        np.testing.assert_allclose(taken(path).time, np.arange(6.0))

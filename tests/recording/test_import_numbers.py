@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -215,3 +216,98 @@ def test_names_that_cannot_be_told_apart_are_not_guessed(tmp_path: Path) -> None
 def test_rows_of_empty_cells_are_blank(tmp_path: Path) -> None:
     text = table("Time (s);Voltage (V);Travel (mm)", "{t:.2f};{v:.6f};{m:.9f}")
     same(imported(tmp_path, f"{text};;\n;;\n")[1])
+
+
+def stamped(form: str, start: datetime, step: float = 0.01) -> str:
+    """Rows with a date and time, one each ``step`` s."""
+    moments = (start + timedelta(seconds=step * i) for i in range(TIME.size))
+    lines = table("Timestamp,Voltage (V),Travel (mm)", "{v:.6f},{m:.9f}").splitlines()
+    rows = [f"{m.strftime(form)},{line}" for m, line in zip(moments, lines[1:], strict=True)]
+    return "\n".join([lines[0], *rows]) + "\n"
+
+
+EVENING, END_OF_APRIL = datetime(2024, 4, 3, 23, 0, 0), datetime(2024, 4, 29, 20, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("form", "start", "step"),
+    [
+        pytest.param("%d/%m/%Y %H:%M:%S.%f", EVENING, 0.01, id="one date"),
+        pytest.param("%d-%m-%y %H:%M", EVENING, 60.0, id="one date, no seconds"),
+        pytest.param("%d/%m/%Y %H:%M:%S", EVENING, 300.0, id="one day after the other"),
+        pytest.param("%m/%d/%Y %H:%M:%S", EVENING, 300.0, id="the same, months first"),
+        pytest.param("%d/%m/%Y %H:%M:%S", END_OF_APRIL, 3600.0, id="no month 29"),
+        pytest.param("%m/%d/%Y %H:%M:%S", END_OF_APRIL, 3600.0, id="no month 29, months first"),
+        pytest.param("%d %b %Y %H:%M:%S", END_OF_APRIL, 3600.0, id="names of months"),
+        pytest.param("%m/%d/%Y %H:%M:%S:%f", EVENING, 0.01, id="Keysight's parts of a second"),
+    ],
+)
+def test_the_order_of_day_and_month_is_that_of_the_whole_column(
+    tmp_path: Path, form: str, start: datetime, step: float
+) -> None:
+    _, run = imported(tmp_path, stamped(form, start, step))
+    np.testing.assert_allclose(run.time, step * np.arange(TIME.size), rtol=0, atol=1e-6)
+
+
+def test_an_order_of_day_and_month_that_a_late_row_tells(tmp_path: Path) -> None:
+    # 500 rows on one date: the layout is found from fewer
+    start = datetime(2024, 4, 12, 12, 0, 0)
+    moments = [start + timedelta(seconds=i) for i in range(500)]
+    moments.append(start + timedelta(days=1))
+    rows = [f"{m.strftime('%m/%d/%Y %H:%M:%S')},{i % 7},{i % 5}" for i, m in enumerate(moments)]
+    text = "\n".join(["Timestamp,Voltage (V),Travel (mm)", *rows])
+    _, run = imported(tmp_path, text)
+    assert run.time[-1] == pytest.approx(86400.0)
+
+
+def test_an_order_of_day_and_month_that_nothing_tells_is_asked(tmp_path: Path) -> None:
+    rows = [f"0{1 + i}/0{1 + i * 2}/2024 12:00:00,{i},{i}" for i in range(4)]
+    text = "\n".join(["Timestamp,Voltage (V),Travel (mm)", *rows])
+    with pytest.raises(InputError, match=r"such as 01/01/2024, may have the day or .* --rate-Hz"):
+        imported(tmp_path, text)
+
+
+def by_sixties(unit: str, step: int = 1) -> str:
+    lines = table(f"Time{unit},Voltage (V),Travel (mm)", "{v:.6f},{m:.9f}").splitlines()
+    times = [2450 + step * i for i in range(TIME.size)]
+    rows = [f"{t // 60}.{t % 60:02d},{line}" for t, line in zip(times, lines[1:], strict=True)]
+    return "\n".join([lines[0], *rows])
+
+
+@pytest.mark.parametrize(("unit", "seconds"), [(" (min)", 1.0), (" [h]", 60.0)])
+@pytest.mark.parametrize("step", [1, 10])
+def test_minutes_and_seconds_with_a_dot(
+    tmp_path: Path, unit: str, seconds: float, step: int
+) -> None:
+    done, run = imported(tmp_path, by_sixties(unit, step))
+    np.testing.assert_allclose(run.time, seconds * (2450 + step * np.arange(TIME.size)), rtol=1e-12)
+    assert any("41.00 follows 40.5" in note for note in done.notes)
+    plain = {f"time_{unit.strip(' ()[]')}": f"Time{unit}*1"}
+    _, other = imported(tmp_path, by_sixties(unit, step), columns=plain)
+    assert other.time[0] == pytest.approx(40.5 * 60.0 * seconds)
+
+
+def test_minutes_and_seconds_in_another_unit_are_asked(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"in s, but .* 41.00 follows 40.59.* --rate-Hz 1$"):
+        imported(tmp_path, by_sixties(" (s)"))
+    with pytest.raises(InputError, match="--column time_min=Time "):
+        imported(tmp_path, by_sixties(""))
+
+
+@pytest.mark.parametrize("step", [0.01, 0.2, 0.5])
+def test_even_decimals_are_no_minutes_and_seconds(tmp_path: Path, step: float) -> None:
+    text = table("Time (min),Voltage (V),Travel (mm)", "{t:.2f},{v:.6f},{m:.9f}")
+    rows = text.splitlines()
+    even = [f"{step * i:.2f},{row.partition(',')[2]}" for i, row in enumerate(rows[1:])]
+    _, run = imported(tmp_path, "\n".join([rows[0], *even]))
+    np.testing.assert_allclose(run.time, 60.0 * step * np.arange(TIME.size), atol=1e-9)
+
+
+@pytest.mark.parametrize("per_second", [1e3, 1e6])
+def test_times_since_1970_tell_their_unit(tmp_path: Path, per_second: float) -> None:
+    text = table("timestamp,voltage_V,displacement_mm", "{T:.0f},{v:.6f},{m:.9f}")
+    rows = text.splitlines()
+    counts = [round((1.7e9 + t) * per_second) for t in TIME]
+    late = [f"{c},{row.partition(',')[2]}" for c, row in zip(counts, rows[1:], strict=True)]
+    _, run = imported(tmp_path, "\n".join([rows[0], *late]))
+    np.testing.assert_allclose(run.time, TIME, atol=1e-6)
