@@ -27,6 +27,9 @@ whatever the film does: drift, interference, and jumps of the sensor. They tell 
 itself is where it was told to be; a reading that repeats such an error in every run, as those of
 these rigs do, hides that.
 
+``--feedforward`` plays nothing: it computes the errors of the film itself under the voltages of
+both models, in a second a rig.
+
 The first run is of the model that ``dearig track --compare`` has chosen by the run of the thesis's
 model, see ``dearig.analysis.tracking``.
 """
@@ -61,6 +64,7 @@ from dearig.drivers.settings import CardSettings
 from dearig.errors import SafetyStop
 from dearig.model import kernel
 from dearig.model.actuator import Actuator
+from dearig.model.control import invert
 from dearig.model.control.bands import low_pass
 from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.settings import DiagnosisSettings
@@ -82,6 +86,7 @@ FIRST = 7300  # seed
 RATE = 200.0  # Hz
 ITERATIONS = 5
 EFFORT = 8e7  # integration steps of a diagnosis: less than a third of its own, for time
+WORSE = 0.2  # um: a fifth of the noise of a reading
 #: Families of which no voltage takes off what they do: they are added to the reading.
 ADDED = ("drift", "interference")
 #: Frequency in Hz of a sine of the target, its cycles, and its part of the largest displacement.
@@ -137,11 +142,15 @@ def main() -> None:
     parser.add_argument("--fit", choices=FITS, default="diagnosis", help="the models [diagnosis]")
     parser.add_argument("--out", type=FilePath, help="keep a line of JSON for each rig here")
     parser.add_argument("--pid", type=int, default=40, help="rigs with the PID loops [40]")
+    parser.add_argument("--feedforward", action="store_true", help="play nothing, see above")
     parser.add_argument("--models", type=FilePath, help="keep the fitted models in this folder")
     given = parser.parse_args()
     seeds = list(islice(_hiding(given.first), given.rigs))
     if given.seeds:
         seeds = [int(seed) for seed in given.seeds.split(",")]
+    if given.feedforward:
+        _feedforward(seeds, FITS[given.fit], given.models)
+        return
     kept = _kept(given.out)
     heads = (
         "hidden (seed)", "found", "noise", "floor", "linear map", "thesis's model",
@@ -258,6 +267,50 @@ def _seeds(rows: list[Row]) -> str:
 
 def _beyond(error: float, noise: float) -> float:
     return math.sqrt(max(error * error - noise * noise, 0.0))
+
+
+def _feedforward(seeds: list[int], fit: Fit, models: FilePath | None) -> None:
+    """Print the errors of the film itself under the voltages of both models."""
+    heads = ("hidden (seed)", "found", "thesis's model", "with the effect", "ratio")
+    print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
+    ratios, worse = [], []
+    for seed in seeds:
+        rig = RigFile(card=CardSettings(sample_rate_Hz=RATE))
+        with tempfile.TemporaryDirectory() as folder:
+            kept = models or FilePath(folder)
+            both = _models(seed, rig, fit, kept, FilePath(folder) / "thesis.h5")[:2]
+        plant, _ = plant_of(f"sim:{seed}", rig.as_film(), rig.as_load())
+        thesis, model = (one.model for one in both)
+        if not (
+            isinstance(plant, TruthPlant)
+            and isinstance(thesis, Actuator)
+            and isinstance(model, Actuator)
+        ):
+            raise TypeError(f"the rig sim:{seed} hides nothing")
+        task = task_of(_target(plant, rig), rig)
+        ours = invert(model, task)
+        theirs = invert(thesis, replace(task, target=ours.reference))
+        truth, errors = Truth(plant, task), []
+        for voltage in (theirs.voltage, ours.voltage):
+            moved = truth.film(voltage)
+            off = np.inf if moved is None else (ours.reference - moved)[ours.reachable]
+            errors.append(float(np.sqrt(np.mean(np.square(off)))) * 1e6)
+        case, ratio = drawn(seed), errors[1] / errors[0]
+        found = ", ".join(name for name, _ in model.effects) or "nothing"
+        if UNKNOWN not in case.families and any(f not in ADDED for f in case.families):
+            ratios.append(ratio)
+        if errors[1] > errors[0] + WORSE:
+            worse.append(seed)
+        print(
+            f"| {' + '.join(case.families)} ({seed}) | {found} | {errors[0]:.2f} | "
+            f"{errors[1]:.2f} | {ratio:.2f} |",
+            flush=True,
+        )
+    print(
+        f"\nThe film itself, in um RMS; {len(seeds)} rigs. Median of the ratios "
+        f"{np.median(ratios):.2f} of {len(ratios)} with an effect that a model can invert; worse "
+        f"by more than {WORSE} um: {worse or 'none'}."
+    )
 
 
 def _row(seed: int, fit: Fit, folder: FilePath, models: FilePath | None, *, with_pid: bool) -> Row:
