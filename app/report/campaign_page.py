@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,12 +20,12 @@ from dearig.batch.queue import (
     CampaignOutcome,
     Queue,
 )
-from dearig.config.campaignfile import settings_text
 from dearig.recording.origin import origins_of_files
 from dearig.report.head import head_of
 from dearig.report.html import picture, prefixes, write_page
 from dearig.report.numbers import NO_VALUE, seconds, significant
 from dearig.report.tables import Row, Table
+from dearig.units import name_and_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -177,19 +178,49 @@ def campaign_table(outcome: CampaignOutcome, most: int | None = None) -> Table:
     # a file is named only where it is not the run's name with .h5
     files = [_other_file(run) for run in runs]
     filed = any(files)
+    settings = _varied(queue)
     rows = [
         Row(
-            (run.name, run.state, *([file] if filed else []), *(_shown(run, n) for n in names)),
+            (
+                run.name,
+                *(_setting(run, path) for path in settings),
+                run.state,
+                *([file] if filed else []),
+                *(_shown(run, n) for n in names),
+            ),
             detail=run.reason,
             muted=run.state in (WAITING, SKIPPED),
             mark=run.state in (LOST, STOPPED),
         )
         for run, file in zip(runs, files, strict=True)
     ]
-    columns = ["State", *(["File"] if filed else []), *names]
+    columns = [*settings.values(), "State", *(["File"] if filed else []), *names]
     head = (("", ""), *((name, "") for name in columns))
     note = f"{left_out} more runs are not listed." if left_out else ""
     return Table("Runs", head, tuple(rows), note)
+
+
+def _varied(queue: Queue) -> dict[str, str]:
+    """Return the settings that differ between runs, with the heads of their columns."""
+    values: dict[str, set[str]] = {}
+    for run in queue.listed:
+        for path in run.settings:
+            values.setdefault(path, set())
+    for path, found in values.items():
+        found.update(_setting(run, path) for run in queue.listed)
+    heads = {path: _head(path) for path, found in values.items() if len(found) > 1}
+    named = list(heads.values())
+    return {path: head if named.count(head) == 1 else path for path, head in heads.items()}
+
+
+def _head(path: str) -> str:
+    name, unit = name_and_unit(path.rpartition(".")[2])
+    return f"{name} ({unit})" if unit else name
+
+
+def _setting(run: RunState, path: str) -> str:
+    value = run.settings.get(path)
+    return NO_VALUE if value is None else json.dumps(value, default=str)
 
 
 def _other_file(run: RunState) -> str:
@@ -215,9 +246,6 @@ def _contents(outcome: CampaignOutcome) -> Callable[[], dict[str, Any]]:
         queue = outcome.queue
         names = numbers_shown(queue, _DRAWN)
         figures = [numbers_figure(queue, names)] if names else []
-        settings = tuple(
-            f"{run.name}: {settings_text(run.settings)}" for run in queue.listed if run.settings
-        )
         return {
             "title": outcome.name,
             "lead": "Campaign",
@@ -230,7 +258,6 @@ def _contents(outcome: CampaignOutcome) -> Callable[[], dict[str, Any]]:
                 ("Folder", (str(outcome.folder),)),
                 ("Rig", (queue.rig,)),
                 ("Begun", (queue.started,)),
-                ("Settings", settings or ("none",)),
             ),
         }
 

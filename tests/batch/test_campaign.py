@@ -21,6 +21,7 @@ from dearig.config.modelfile import save_model
 from dearig.errors import DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
 from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.report.campaign_page import campaign_table
 from tests.tools.command import LOBE
 from tests.tools.played import PLAN, RIG_FILE, UNKNOWN, Bench, Killed
 
@@ -433,3 +434,13 @@ def test_the_gate_checks_a_run_with_the_film_s_present_model(
         bench.play(plan)
     assert bench.played.total() == 1
     assert states(bench) == ["done", "waiting", "waiting"]
+
+
+def test_the_table_of_runs_has_the_settings_that_differ(bench: Bench) -> None:
+    bench.play(
+        PLAN.replace("repeat = 3", "")
+        + '[grid]\n"segment.0.amplitude_kV" = [2.0, 3.0]\n"segment.0.frequency_Hz" = [1.0]\n'
+    )
+    table = campaign_table(seen(bench.out))
+    assert [head for head, _ in table.head] == ["", "amplitude (kV)", "State"]
+    assert [row.cells[1:] for row in table.rows] == [("2.0", "done"), ("3.0", "done")]

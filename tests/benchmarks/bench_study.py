@@ -168,7 +168,8 @@ class Turns:
             os.killpg(self._process.pid, signal.SIGSTOP)
             root = psutil.Process(self._process.pid)
             spent = [p.cpu_times() for p in (root, *root.children(recursive=True))]
-            self.cpu = sum(each.user + each.system for each in spent)
+            ended = spent[0].children_user + spent[0].children_system
+            self.cpu = ended + sum(each.user + each.system for each in spent)
         self.seen.append((self.count(), self.cpu))
 
     def close(self) -> None:
@@ -180,7 +181,8 @@ class Turns:
     def cost(self, recordings: float) -> float:
         """Return the processor time in s until so many ``recordings`` were done."""
         rows, cpu = np.array(self.seen, dtype=float).T
-        return float(np.interp(recordings, rows, cpu))
+        rows, first = np.unique(rows, return_index=True)
+        return float(np.interp(recordings, rows, cpu[first]))
 
 
 def beside(folder: Path, recordings: Path) -> None:
