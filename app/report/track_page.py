@@ -24,6 +24,7 @@ from dearig.report.figure_style import (
     blank,
     few_ticks,
     legend,
+    log_axis,
     style,
 )
 from dearig.report.head import head_of
@@ -108,7 +109,10 @@ def track_warnings(outcome: TrackOutcome) -> tuple[str, ...]:
     """Return what the operator should know of the target, the model and the runs."""
     parts = (f"Not reachable: {part.sentence}." for part in outcome.inversion.unreachable)
     notes = (f"{run.label}: {note}." for run in outcome.runs for note in run.notes)
-    return tuple(readable(said) for said in (*(f"{w}." for w in outcome.warnings), *parts, *notes))
+    return tuple(
+        readable(said)
+        for said in (*(f"{w.rstrip('.')}." for w in outcome.warnings), *parts, *notes)
+    )
 
 
 def runs_table(outcome: TrackOutcome) -> Table:
@@ -210,7 +214,7 @@ def errors_figure(outcome: TrackOutcome) -> Figure:
     with style():
         figure = blank(WIDTH, 2.6)
         ax = figure.subplots()
-        ax.semilogy(
+        ax.plot(
             [r.iteration for r in ours], [r.rms * _UM for r in ours],
             "o-", color=MEASURED, label="model, then learned",
         )  # fmt: skip
@@ -222,6 +226,10 @@ def errors_figure(outcome: TrackOutcome) -> Figure:
                 outcome.noise * _UM, color=ERROR, linestyle=(0, (3, 2)), linewidth=1.0,
                 label="noise of a reading",
             )  # fmt: skip
+        drawn = np.array([r.rms for r in outcome.runs] + [outcome.noise]) * _UM
+        drawn = drawn[np.isfinite(drawn) & (drawn > 0.0)]
+        if drawn.size:
+            log_axis(ax, "y", 0.8 * drawn.min(), 1.25 * drawn.max())
         ax.set_xlabel("Iteration")
         ax.set_ylabel("Error (\N{MICRO SIGN}m RMS)")
         ax.set_xticks([r.iteration for r in ours])

@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 _PROPOSALS = 6  # that are shown; all are in the JSON
-_AT_ONCE = "All at once, 95 %"  # head of a column
+_AT_ONCE = "All at once, 95\N{NO-BREAK SPACE}%"  # head of a column
 
 
 def trends_json(trends: Trends, source: Path, written: dict[str, Path | None]) -> dict[str, Any]:
