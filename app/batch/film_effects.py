@@ -19,6 +19,7 @@ _CALMER_MIN = 0.3  # of the scatter: neighbours that differ less have drifted to
 _OWN_MAX = 1.0 / 3.0
 #: Gain over that of the best one from which others are taken in the same round.
 _SHARE_MIN = 0.5
+_EXPONENT_MAX = 700.0  # of which a hundredfold exponential is a finite number
 _ROUNDS_MAX = 20
 _EXTRAS_MAX = 60  # of a number: more say that a column is missing, and make the fit slow
 
@@ -57,7 +58,8 @@ class Explained:
 
     def told(self, value: float) -> float:
         """Return a difference of the model in percent, or in the number's unit."""
-        return 100.0 * math.expm1(value) if self.relative else value
+        # a slope per day of runs within minutes may be beyond all numbers
+        return 100.0 * math.expm1(min(value, _EXPONENT_MAX)) if self.relative else value
 
     def slopes_of(self, i: int) -> list[int]:
         """Return the places of the films' own slopes of column ``i``."""

@@ -16,7 +16,15 @@ import numpy as np
 
 from dearig.errors import InputError
 
-__all__ = ["Column", "Design", "columns_in", "days_of_films", "design_of", "films_in"]
+__all__ = [
+    "FREEDOM_MIN",
+    "Column",
+    "Design",
+    "columns_in",
+    "days_of_films",
+    "design_of",
+    "films_in",
+]
 
 #: Label, unit, column of the table, and range below which it counts as hardly varied: that of a
 #: room that is held within a standard atmosphere of class 1 (ISO 291: 1 °C and 5 % either way).
@@ -26,6 +34,9 @@ _ENVIRONMENT = (
 )
 _CYCLES = "cycles"
 _SECONDS_A_DAY = 86400.0
+#: Degrees of freedom, at least: with one, an interval is 12.7 standard errors wide on either side,
+#: and its own error is not bounded.
+FREEDOM_MIN = 2
 _RIGS_MAX = 8  # each is a row of every number in the table, which is to be read
 #: Part of a column's variance that the columns before it explain, above which it is left out: its
 #: interval would be ten times as wide as by itself.
@@ -100,7 +111,7 @@ def columns_in(
         values = _numbers(rows, name)
         if np.isfinite(values).any():
             found.append(Column(name.removeprefix("set "), "", values))
-    return found + _rigs(rows)
+    return found + _rigs(rows, films)
 
 
 def _named(rows: Sequence[Mapping[str, Any]], name: str) -> Column:
@@ -152,11 +163,15 @@ def _cycles_before(
     return before
 
 
-def _rigs(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
-    """Return a column of zeros and ones for each rig but the first."""
+def _rigs(rows: Sequence[Mapping[str, Any]], films: Sequence[str]) -> list[Column]:
+    """Return a column of zeros and ones for each rig but the first.
+
+    There are none where each film was on one rig, and the films are too few to tell them from rigs.
+    """
     names = [str(row.get("rig") or "") for row in rows]
-    rigs = sorted(set(names))
-    if not 1 < len(rigs) <= _RIGS_MAX:
+    rigs, each = sorted(set(names)), set(films)
+    is_of_films = len(set(zip(films, names, strict=True))) == len(each)
+    if not 1 < len(rigs) <= _RIGS_MAX or (is_of_films and len(each) - len(rigs) < FREEDOM_MIN):
         return []
     return [
         Column(f"rig {rig} in place of {rigs[0]}", "", np.array([n == rig for n in names], float))

@@ -23,6 +23,7 @@ from dearig.batch.mixed_model import LinearFit, Sample, fit_linear, slopes_diffe
 from dearig.batch.next_experiment import Proposal, proposals
 from dearig.batch.table_file import write_csv, write_parquet
 from dearig.batch.trend_columns import (
+    FREEDOM_MIN,
     Column,
     Design,
     columns_in,
@@ -60,9 +61,6 @@ VERDICTS = {
 }
 #: Errors of the model, and the peak displacement: their trends are found like those of parameters.
 _ERRORS = ("rms_um", "rms_kPa", "nrmse_pct", "peak_displacement_mm")
-#: Degrees of freedom of a trend, at least: with one, an interval is 12.7 standard errors wide on
-#: either side, and its own error is not bounded.
-_FREEDOM_MIN = 2
 _SIGNIFICANT = 0.05
 #: Of a single interval, and of all simultaneous ones together.
 _CONFIDENCE = 1.0 - _SIGNIFICANT
@@ -358,7 +356,7 @@ def _trend(
     Where there is none, ``told`` receives the reason.
     """
     at = np.array([i for i, row in enumerate(rows) if _is_known(row, name)], dtype=int)
-    if at.size < 2 + _FREEDOM_MIN:  # intercept and one slope
+    if at.size < 2 + FREEDOM_MIN:  # intercept and one slope
         told.append(f"{name}: {at.size} runs have a value that their data determine.")
         return None
     used = np.zeros(len(rows), dtype=bool)
@@ -374,7 +372,7 @@ def _trend(
         used[:] = False
         used[at] = True
         design = design_of(columns, used)
-    if not design.columns or at.size < 1 + len(design.columns) + _FREEDOM_MIN:
+    if not design.columns or at.size < 1 + len(design.columns) + FREEDOM_MIN:
         told.append(f"{name}: {at.size} runs are too few for {len(design.columns)} columns.")
         return None
     told.extend(design.left_out)

@@ -68,6 +68,25 @@ def test_simultaneous_intervals_are_those_of_sidak(story: Trends) -> None:
             assert math.isclose(wide.mean(), single.mean())
 
 
+def test_slopes_per_day_of_runs_within_seconds_are_numbers() -> None:
+    rows = made_rows(3, films=3, runs=6)
+    for i, row in enumerate(rows):
+        row["started"], row["cycles"] = f"2026-11-02T08:00:{i:02d}+00:00", None
+    found = trends_of(rows, numbers=["mu_0_kPa"])
+    assert "days" in {effect.column.label for effect in found.trends[0].effects}
+    for row in found.effect_rows():
+        assert math.isfinite(row["high95_simultaneous"])
+
+
+@pytest.mark.parametrize(("rigs", "compared"), [(3, 0), (2, 1)])
+def test_rigs_are_compared_where_they_can_be_told_from_films(rigs: int, compared: int) -> None:
+    rows = made_rows(3, films=4, runs=6)
+    for row in rows:
+        row["rig"] = f"rig {int(row['film'][1:]) % rigs}"
+    (trend,) = trends_of(rows, numbers=["mu_0_kPa"]).trends
+    assert sum(effect.column.label.startswith("rig") for effect in trend.effects) == compared
+
+
 def test_one_number_over_one_column_has_one_interval() -> None:
     (trend,) = trends_of(
         made_rows(2, films=6), numbers=["mu_0_kPa"], against=["temperature_degC"]
