@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -265,11 +265,9 @@ class Search:
         regression, extent = self._regression(parent)
         effects = [e for e in self.effects if e.name not in parent.effects]
         starts = regression.starts(effects, extent)
-        fits = race(
-            self.fitter,
-            self.judge,
+        fits = self._run(
             parent,
-            regression.misfit,
+            regression,
             [
                 Candidate(
                     (name,),
@@ -285,15 +283,9 @@ class Search:
         if fits and not self.judge.is_noise(fits[0]):
             fits = self._with_general(parent, regression, extent, fits)
         if pairs and fits and not self.judge.is_noise(fits[0]):
-            both = race(
-                self.fitter,
-                self.judge,
-                parent,
-                regression.misfit,
-                [Candidate(s.names, (s,)) for s in regression.pairs(self.settings.pairs)],
-            )
-            fits = self.judge.ranked([*fits, *both])
-        fits = [self.keep(fit) for fit in fits]
+            both = regression.pairs(self.settings.pairs)
+            fits += self._run(parent, regression, [Candidate(s.names, (s,)) for s in both])
+            fits = self.judge.ranked(fits)
         self.races.append(
             Race(
                 parent,
@@ -316,8 +308,14 @@ class Search:
         laws = [e for e in self.general if e.family in families and e.name not in parent.effects]
         starts = regression.starts(laws, extent)
         candidates = [Candidate((name,), tuple(some), True) for name, some in starts.items()]
-        raced = race(self.fitter, self.judge, parent, regression.misfit, candidates)
-        return self.judge.ranked([*fits, *raced])
+        return self.judge.ranked([*fits, *self._run(parent, regression, candidates)])
+
+    def _run(
+        self, parent: Fit, regression: Regression, candidates: Sequence[Candidate]
+    ) -> list[Fit]:
+        """Return the fits that came through one race, and keep them: the next may be the last."""
+        fits = race(self.fitter, self.judge, parent, regression.misfit, candidates)
+        return [self.keep(fit) for fit in fits]
 
     def _regression(self, parent: Fit) -> tuple[Regression, Extent]:
         fitter, records = self.fitter, self.fitter.records

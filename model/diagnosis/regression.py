@@ -428,16 +428,21 @@ class Regression:
     def pairs(self, many: int) -> list[Start]:
         """Return the ``many`` best starts of two effects of different families, best first.
 
-        ``starts`` must have been called. Of two families together at most three pairs, and none of
-        general laws: two forms can be had in too many ways.
+        ``starts`` must have been called. Two effects explain a share of what the best one leaves;
+        else a race beside that one finds the second. Of two families together at most three pairs,
+        and none of general laws: two forms can be had in too many ways.
         """
         ranked = []
+        least = min((some[0][0] for some in self._best.values()), default=self.misfit)
+        most = math.sqrt(1.0 + (1.0 - self.settings.share) * max(least**2 - 1.0, 0.0))
         named = [name for name in self._best if not EFFECTS[name].is_general]
         for m, n in combinations(named, 2):
             if EFFECTS[m].family != EFFECTS[n].family:
                 (_, _, c), (_, _, d) = self._best[m][0], self._best[n][0]
                 a, left = self._solve([c, d])
-                ranked.append((self._weighed(left, a, [c, d]), m, n))
+                misfit = self._weighed(left, a, [c, d])
+                if misfit < most:
+                    ranked.append((misfit, m, n))
         ranked.sort()
         taken: dict[frozenset[str], int] = {}
         found: list[Start] = []

@@ -266,7 +266,14 @@ def profile(
             # a fraction of the threshold
             gain = 0.03 * threshold
             fit = descend(
-                problem, guesses[chosen], fixed, iterations=8, gain=gain, damping=1e-5, patience=2
+                problem,
+                guesses[chosen],
+                fixed,
+                iterations=8,
+                gain=gain,
+                damping=1e-5,
+                patience=2,
+                quick=True,
             )
             z = math.sqrt(max(fit.cost * problem.samples - chi2, 0.0) / threshold)
             if abs(z - 1.0) < near:

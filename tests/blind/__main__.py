@@ -40,7 +40,7 @@ from tests.blind.table import line, report
 def main() -> None:
     given = _arguments()
     modes = tuple(MODES) if given.train == "both" else (given.train,)
-    bench = Bench(given.out, given.rate)
+    bench = Bench(given.out, given.rate, given.bare)
     seeds = given.seeds or chosen(
         given.first, given.cases, given.clean, given.per_family, given.hand
     )
@@ -133,6 +133,7 @@ def _arguments() -> argparse.Namespace:
     add("--jobs", type=int, choices=(1, 2, 3, 4), default=2, help="cases at a time [2]")
     add("--out", type=Path, default=_cache(), help="where results are kept [the user's cache]")
     add("--keep", action="store_true", help="take results of other sources as well")
+    add("--bare", action="store_true", help="leave the intervals of parameters out, for speed")
     add("--table", action="store_true", help="print the table of what is there, play nothing")
     return parser.parse_args()
 

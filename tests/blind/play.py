@@ -99,9 +99,13 @@ def case_of(result: Mapping[str, Any]) -> Case:
 
 
 class Bench:
-    """A folder of results at one sample rate, with the rig file that made them."""
+    """A folder of results at one sample rate, with the rig file that made them.
 
-    def __init__(self, folder: Path, rate: float) -> None:
+    Parameters of a ``bare`` one have no intervals.
+    """
+
+    def __init__(self, folder: Path, rate: float, bare: bool = False) -> None:
+        self.bare = bare
         self.folder = folder / f"{rate:g}Hz"
         self.folder.mkdir(parents=True, exist_ok=True)
         self.rig_path = self.folder / "rig.toml"
@@ -155,7 +159,7 @@ class Bench:
             except DearigError as fault:
                 return self._kept(case, sources, None, f"not recorded: {fault}", 0.0)
             before = _processor_seconds()
-            answer, error, seconds = diagnose(train, validation, folder / "out.json")
+            answer, error, seconds = diagnose(train, validation, folder / "out.json", self.bare)
         # of all cases that run at a time: true of one job only
         processor = _processor_seconds() - before
         return self._kept(case, sources, answer, error, seconds, processor)
@@ -239,10 +243,14 @@ def _processor_seconds() -> float:
 
 
 def diagnose(
-    train: Sequence[Path], validation: Sequence[Path], out: Path
+    train: Sequence[Path], validation: Sequence[Path], out: Path, bare: bool = False
 ) -> tuple[dict[str, Any] | None, str, float]:
-    """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took."""
-    command = [sys.executable, "-m", "dearig", "diagnose", *map(str, train)]
+    """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took.
+
+    With ``bare`` the intervals of parameters are left out.
+    """
+    program = ["tests.blind.bare"] if bare else ["dearig", "diagnose"]
+    command = [sys.executable, "-m", *program, *map(str, train)]
     for path in validation:
         command += ["--validate", str(path)]
     command += ["--json", str(out)]

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from dearig.model.actuator import Drive
-from dearig.model.diagnosis import diagnose
+from dearig.model.diagnosis import diagnose, engine
 from dearig.model.diagnosis.fits import Fitter
+from dearig.model.diagnosis.race import race
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting import identify
@@ -81,18 +82,28 @@ def test_the_baseline_follows_the_valley_of_two_branches_of_nearly_equal_times()
     assert (searched.cost - costs[0]) * problem.samples < 2.0
 
 
+#: A reading that gains 24 um at two places of the travel.
+NO_NAMED_FORM = effect(
+    "general sensor curve",
+    **{f"error_{i}": 24e-6 if i in (2, 5) else 0.0 for i in range(1, 9)},
+    travel=4e-4,
+)
+
+
+def of_no_named_form() -> ActuatorRecord:
+    hidden = replace(PLAIN, effects=NO_NAMED_FORM)
+    return record_of(hidden, replace(thesis_drive(), hold=True))
+
+
 def test_a_form_that_no_law_with_a_name_has_is_found_by_the_general_law() -> None:
-    # a reading that gains 24 um at two places of the travel
-    steps = {f"error_{i}": 24e-6 if i in (2, 5) else 0.0 for i in range(1, 9)}
-    hidden = effect("general sensor curve", **steps, travel=4e-4)
-    record = record_of(replace(PLAIN, effects=hidden), replace(thesis_drive(), hold=True))
+    record = of_no_named_form()
     found = diagnose([record], PLAIN, workers=1)
     assert found.verdict == "explained"
     (step,) = found.steps
     assert (step.effect, step.family) == ("general sensor curve", "sensor_nonlinearity")
     assert EFFECTS[step.nearest].family == "sensor_nonlinearity"
     assert any(f"{step.nearest} comes nearest" in said for said in step.evidence)
-    (truth,) = (EFFECTS[name].curve(dict(values)) for name, values in hidden)
+    (truth,) = (EFFECTS[name].curve(dict(values)) for name, values in NO_NAMED_FORM)
     reached = truth.axis < 1e3 * record.displacement.max()
     there = np.interp(truth.axis, step.curve.axis, step.curve.values)
     # but for a slope, which is the film's as well
@@ -119,6 +130,21 @@ def test_a_search_without_work_left_ends_with_what_it_has() -> None:
     found = diagnose([record_of(plant("sensor curvature"))], PLAIN, workers=1, settings=settings)
     assert found.status == "budget"
     assert any("computing budget" in note for note in found.notes)
+
+
+def test_a_search_keeps_what_it_has_fitted_when_its_work_ends(monkeypatch) -> None:
+    races = []
+
+    def race_once(*given):
+        if races:
+            raise engine.Spent
+        races.append(given)
+        return race(*given)
+
+    monkeypatch.setattr(engine, "race", race_once)
+    found = diagnose([of_no_named_form()], PLAIN, workers=1)
+    assert found.status == "budget"
+    assert [step.family for step in found.steps] == ["sensor_nonlinearity"]
 
 
 def after_rest(way: np.ndarray) -> ActuatorRecord:
