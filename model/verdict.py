@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -73,9 +72,4 @@ def judge(
         "stopped": found == NOTHING_MISSING and status == STOPPED,
     }
     reasons = tuple(name for name, doubtful in doubts.items() if doubtful)
-    lowering = set(reasons)
-    if found == NOTHING_MISSING and all(math.isfinite(error) for error in validation):
-        # the parameters' own error can exceed the noise on recordings that they were not fitted
-        # to; without an effect that was found, that is a reason to look, and no missing effect
-        lowering.discard("validation")
-    return Judgement(PARTLY_EXPLAINED if lowering else found, reasons)
+    return Judgement(PARTLY_EXPLAINED if reasons else found, reasons)

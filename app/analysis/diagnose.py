@@ -57,7 +57,9 @@ from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.events import Own, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
+from dearig.model.fitting.prediction import prediction_error
 from dearig.model.records import ActuatorRecord
+from dearig.model.verdict import NOTHING_MISSING
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
 from dearig.recording.recording import Recording
@@ -400,9 +402,31 @@ def _outcome(
         few_data=few_data(recordings, drive),
         assumed=assumed_by(recordings, settings.rig_file),
         not_compared=tuple(r.name for r in others if r.name not in compared),
+        prediction_errors=_prediction_errors(
+            [r for r in others if r.name in compared], finding, drive
+        ),
     )
     history = _history(outcome, recordings)
     return replace(outcome, model=replace(outcome.model, history=history))
+
+
+@for_simulations()
+def _prediction_errors(
+    recordings: Sequence[Recording], finding: Diagnosis, drive: str
+) -> tuple[float, ...]:
+    """Return what the parameters' own error may make of each recording, in m or Pa.
+
+    () where an effect was found, or the parameters have no covariance: it is not asked for.
+    """
+    final = finding.final
+    if finding.verdict != NOTHING_MISSING or not final.covariance_names:
+        return ()
+    return tuple(
+        prediction_error(
+            as_record(r, drive), final.predicting, final.covariance_names, final.covariance
+        )
+        for r in recordings
+    )
 
 
 def _title(recordings: Sequence[Recording]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from dearig.errors import DearigError
 from dearig.model.noise import LEAD_IN
-from dearig.model.verdict import STOPPED, Judgement, judge
+from dearig.model.verdict import NOTHING_MISSING, STOPPED, Judgement, judge
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
@@ -255,7 +255,9 @@ class DiagnoseOutcome:
     on the rig early, None if none did. ``not_compared`` names validation recordings that the final
     model cannot follow. ``few_data`` says how few data were fitted, "" if there are enough.
     ``assumed`` says which values of the film and the load no recording has, "" if none.
-    ``seconds`` is the computing time.
+    ``prediction_errors`` are, of each validation recording, the part in m or Pa that the errors of
+    the fitted parameters alone may make (95 % bound), () where that is not known. ``seconds`` is
+    the computing time.
     """
 
     title: str
@@ -276,6 +278,7 @@ class DiagnoseOutcome:
     not_compared: tuple[str, ...] = ()
     few_data: str = ""
     assumed: str = ""
+    prediction_errors: tuple[float, ...] = ()
 
     @property
     def status(self) -> str:
@@ -293,6 +296,12 @@ class DiagnoseOutcome:
         """The verdict that all numbers support, with the reasons against a better one."""
         finding = self.finding
         untouched = [c.over_noise(self.noise) for c in self.after.validation]
+        if finding.verdict == NOTHING_MISSING and self.prediction_errors:
+            # what the parameters' own error explains is no missing effect
+            untouched = [
+                over / math.hypot(1.0, own / self.noise)
+                for over, own in zip(untouched, self.prediction_errors, strict=True)
+            ]
         # of a film with the error that its model is allowed
         noise = math.sqrt(sum(s.noise**2 for s in finding.after) / len(finding.after))
         return judge(

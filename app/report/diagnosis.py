@@ -185,6 +185,13 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
             f"The model explains the training recordings, but not the validation recordings: "
             f"{listed(left)}."
         )
+    elif outcome.prediction_errors and any(
+        c.over_noise(outcome.noise) > TOLERANCE for c in outcome.after.validation
+    ):
+        yield (
+            "On a validation recording more than the noise is left, as much as the errors of the "
+            "fitted parameters may make there."
+        )
     if "selection" in reasons:
         before, after = (
             significant(stage.selection_rms * shown.error_factor) for stage in (baseline, final)

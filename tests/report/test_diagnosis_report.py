@@ -191,19 +191,29 @@ class TestHeadline:
     """The headline says no more than the numbers, in every place alike."""
 
     def test_a_validation_error_above_the_noise_is_said_first(self):
-        for verdict, steps, told in (
-            ("explained", (SURE,), "partly_explained"),
-            ("nothing_missing", (), "nothing_missing"),
-        ):
+        for verdict, steps in (("explained", (SURE,)), ("nothing_missing", ())):
             outcome = left(verdict, 2.7, steps=steps)
-            assert outcome.verdict == told
+            assert outcome.verdict == "partly_explained"
             assert headline(outcome) == "Training recordings explained, validation recordings not"
             said = summary(outcome)[0]
             assert "validation-0.h5 keeps 2.7 times its noise" in said
             assert "only noise" not in " ".join(summary(outcome))
-            assert diagnosis_json(outcome)["verdict"] == told
+            assert diagnosis_json(outcome)["verdict"] == "partly_explained"
             assert diagnosis_json(outcome)["verdict_reasons"] == ["validation"]
         assert left("explained", 1.14, steps=(SURE,)).verdict == "explained"
+
+    def test_what_the_parameters_own_error_explains_is_no_missing_effect(self):
+        clean = left("nothing_missing", 2.7, steps=())
+        allowed = replace(clean, prediction_errors=(2.5 * NOISE, 0.0))
+        assert allowed.verdict == "nothing_missing"
+        assert headline(allowed) == "No missing effect found"
+        assert "as much as the errors of the fitted parameters" in summary(allowed)[0]
+        assert replace(clean, prediction_errors=(2.0 * NOISE, 0.0)).judgement.reasons == (
+            "validation",
+        )
+        # beside an effect that was found, the error is the model's
+        found = replace(left("explained", 2.7, steps=(SURE,)), prediction_errors=(9.0, 9.0))
+        assert found.verdict == "partly_explained"
 
     def test_a_recording_that_the_model_cannot_follow_is_not_explained(self):
         outcome = diagnose_outcome(not_compared=("fast",))
