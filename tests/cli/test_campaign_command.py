@@ -44,7 +44,8 @@ def test_a_campaign_from_its_check_to_its_page(given, tmp_path: Path) -> None:
     }  # fmt: skip
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "3 runs: 3 done." in page
-    assert "segment.0.amplitude_kV = 3.0" in page
+    assert '<th scope="col">amplitude (kV)</th>' in page
+    assert '<th scope="row">3.0kV</th><td>3.0</td><td>done</td>' in page
     shown = done("campaign-queue", tmp_path / "out", "--json", "-")
     assert shown.json == found.json
     refused(dearig("campaign", *given), "3 of 3 runs done", "--resume")
