@@ -189,8 +189,8 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
         c.over_noise(outcome.noise) > TOLERANCE for c in outcome.after.validation
     ):
         yield (
-            "On a validation recording more than the noise is left, as much as the errors of the "
-            "fitted parameters may make there."
+            "A validation recording keeps more than its noise; the uncertainty of the fitted "
+            "parameters is large enough to explain it."
         )
     if "selection" in reasons:
         before, after = (

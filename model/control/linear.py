@@ -19,8 +19,9 @@ __all__ = ["Linearised", "level_of", "linearise", "readings_under", "repeatable_
 
 _STEP = 0.02  # of the voltage squared
 _FLOOR = 1e-4  # of the largest gain: what is less is not inverted
-#: Of the gain on both sides of a dip: what is less is not inverted. A mean over time reads nothing
-#: of some frequencies, and its exact inverse rings there.
+#: Gain in a dip, over the gain on both sides of it, below which the inverse is bounded. A sensor
+#: that averages over time reads nothing at some frequencies, and an exact inverse rings there. The
+#: value assumes that a model's gain is right to a tenth of the gain beside the dip.
 _DIP = 0.1
 
 

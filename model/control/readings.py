@@ -23,7 +23,7 @@ __all__ = [
 
 _OUTLIER = 6.0  # times the median deviation: 4 standard deviations of a normal one
 _FARTHEST = 1.0  # m: no film moves so far
-_LINES = 3  # mains and its aliased harmonics are nearer to each other than a lead-in tells apart
+_LINES = 3  # mains, third and fifth harmonic: aliased, a lead-in may not tell them apart
 _STANDS_OUT = 30.0  # times the power of noise: by chance once in 10^13 lines
 _MEDIAN_OF_NORMAL = 0.6745  # median of |x| for a normal x of unit variance
 

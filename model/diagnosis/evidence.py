@@ -111,8 +111,8 @@ class Judge:
         """Whether nothing is left that any effect could explain.
 
         The residual is white, or as coloured as the reading at rest, or so small a part of what is
-        explained that it may be the form of a law. A branch at the shortest time of the search may
-        stand for an effect that is faster.
+        explained that it may be the form of a law. A fit with a branch at the shortest time of the
+        search is not settled: that branch may imitate a faster effect.
         """
         if not self.is_noise(fit):
             return False

@@ -112,7 +112,7 @@ class Fit:
 
     @property
     def has_fastest_branch(self) -> bool:
-        """Whether a branch is as fast as the search allows: it stands for something faster."""
+        """Whether a branch has the shortest time of the search: it may imitate a faster effect."""
         layout = self.problem.layout
         times = layout.column("T")
         return bool(np.any(np.isclose(self.x[times], layout.lower[times])))

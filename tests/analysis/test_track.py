@@ -71,7 +71,7 @@ def followed(folder, model=MODEL, **options):
 
 @pytest.fixture(scope="module")
 def learned(tmp_path_factory):
-    """A wrong model that learns, beside a worse one and a linear map."""
+    """Learning from a wrong model, with a worse model and a linear map to compare."""
     folder = tmp_path_factory.mktemp("learned") / "out"
     return followed(
         folder, WRONG, iterations=3, compare=WORSE, options=RunOptions(notes="before lunch")

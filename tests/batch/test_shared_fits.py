@@ -96,7 +96,7 @@ def test_other_options_of_the_fit_do_not_share_parameters(shelf: Path, tmp_path:
 def test_films_are_fitted_on_a_cluster_as_here(
     shelf: Path, fitted: list[list[str]], table: Callable[[], StudyTable], tmp_path: Path
 ) -> None:
-    distributed = pytest.importorskip("distributed")
+    distributed = pytest.importorskip("distributed", reason='takes the extra "cluster"')
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
     ) as cluster:

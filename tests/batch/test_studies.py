@@ -167,7 +167,7 @@ def test_a_lost_cluster_leaves_the_rest_to_this_computer(
 
 @pytest.mark.filterwarnings("ignore")
 def test_dask_gives_the_same_table(shelf: Path, options: StudyOptions, tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
+    distributed = pytest.importorskip("distributed", reason='takes the extra "cluster"')
     subjects = subjects_of([shelf / "recordings"], tmp_path)
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None

@@ -101,12 +101,12 @@ def case_of(result: Mapping[str, Any]) -> Case:
 class Bench:
     """A folder of results at one sample rate, with the rig file that made them.
 
-    Parameters of a ``bare`` one have no intervals.
+    Parameters of a ``bare`` one have no intervals; its results are apart, as their times are.
     """
 
     def __init__(self, folder: Path, rate: float, bare: bool = False) -> None:
         self.bare = bare
-        self.folder = folder / f"{rate:g}Hz"
+        self.folder = folder / (f"{rate:g}Hz-bare" if bare else f"{rate:g}Hz")
         self.folder.mkdir(parents=True, exist_ok=True)
         self.rig_path = self.folder / "rig.toml"
         text = read_text(HERE / "rig.toml", "rig file")

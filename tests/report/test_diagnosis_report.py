@@ -207,7 +207,7 @@ class TestHeadline:
         allowed = replace(clean, prediction_errors=(2.5 * NOISE, 0.0))
         assert allowed.verdict == "nothing_missing"
         assert headline(allowed) == "No missing effect found"
-        assert "as much as the errors of the fitted parameters" in summary(allowed)[0]
+        assert "uncertainty of the fitted parameters is large enough" in summary(allowed)[0]
         assert replace(clean, prediction_errors=(2.0 * NOISE, 0.0)).judgement.reasons == (
             "validation",
         )

@@ -16,6 +16,7 @@ import os
 import random
 import subprocess
 import sys
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -35,10 +36,9 @@ from dearig.sim_backend.daqmx.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
 from dearig.sim_backend.daqmx.server import DaqmxServer
 from dearig.window.document import TextFile
-from dearig.window.frame import MainWindow
 from dearig.window.session import Session
 from dearig.window.theme import LIGHT, prepare_plots
-from tests.window.real_window import Hand, end, until
+from tests.window.real_window import Hand, end, shown, until
 
 RIG = """\
 [film]
@@ -78,10 +78,7 @@ def play(folder: Path, port: int, picture: str) -> None:
     prepare_plots()
     settings = QSettings(str(folder / "settings.ini"), QSettings.Format.IniFormat)
     session = Session(folder, settings, theme=LIGHT)
-    window = MainWindow(session)
-    window.setGeometry(0, 0, 1366, 768)
-    window.show()
-    window.activateWindow()
+    window = shown(session)
     hand, page = Hand(), window.campaign_page
     controls = page.controls
     until(window.isActiveWindow, "the window becomes active")
@@ -245,15 +242,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("killed"))
+    parser.add_argument("--out", type=Path, help="a new folder [a temporary one]")
     parser.add_argument("--window", nargs=3, metavar=("FOLDER", "PORT", "NAME"))
     asked = parser.parse_args()
     if asked.window:
         folder, port, name = asked.window
         play(Path(folder), int(port), name)
         return
-    folder, runs = asked.out.resolve(), asked.kills + 1
-    folder.mkdir(parents=True)
+    runs = asked.kills + 1
+    if asked.out is None:
+        folder = Path(tempfile.mkdtemp(prefix="dearig-killed-"))
+    elif asked.out.exists():
+        parser.error(f"{asked.out} exists: give --out a folder that does not")
+    else:
+        folder = asked.out.resolve()
+        folder.mkdir(parents=True)
+    print(f"in {folder}")
     for name, text in (("rig", RIG), ("lobe", LOBE), ("plan", PLAN.format(runs=runs))):
         (folder / f"{name}.toml").write_text(text, "utf-8")
     rng = random.Random(asked.seed)  # noqa: S311

@@ -70,6 +70,18 @@ class Hand:
         self._x.XFlush(self._display)
 
 
+def shown(session: Session) -> MainWindow:
+    """Return the window of ``session``, shown at the size of a small screen, to be the active one.
+
+    The window system makes it active, so that the caller waits for that.
+    """
+    window = MainWindow(session)
+    window.setGeometry(0, 0, 1366, 768)
+    window.show()
+    window.activateWindow()
+    return window
+
+
 def until(condition: Callable[[], bool], what: str) -> None:
     loop, late = QEventLoop(), QTimer()
     look = QTimer(interval=10)
@@ -96,10 +108,7 @@ def main() -> None:
     folder = Path(sys.argv[1])
     settings = QSettings(str(folder / "settings.ini"), QSettings.Format.IniFormat)
     session = Session(folder, settings, theme=LIGHT)
-    window = MainWindow(session)
-    window.setGeometry(0, 0, 1366, 768)
-    window.show()
-    window.activateWindow()
+    window = shown(session)
     hand, page = Hand(), window.run_page
     saw: dict[str, object] = {"platform": application.platformName()}
 

@@ -13,10 +13,9 @@ from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QWidget
 
-from dearig.window.frame import MainWindow
 from dearig.window.session import Session
 from dearig.window.theme import LIGHT, prepare_plots
-from tests.window.real_window import Hand, until
+from tests.window.real_window import Hand, shown, until
 
 SEQUENCE = """\
 # for film 7
@@ -36,10 +35,7 @@ def main() -> None:
     (folder / "mine.toml").write_text(SEQUENCE)
     settings = QSettings(str(folder / "settings.ini"), QSettings.Format.IniFormat)
     session = Session(folder, settings, theme=LIGHT)
-    window = MainWindow(session)
-    window.setGeometry(0, 0, 1366, 768)
-    window.show()
-    window.activateWindow()
+    window = shown(session)
     hand, rig, sequence, run = Hand(), window.rig_page, window.sequence_page, window.run_page
     saw: dict[str, object] = {}
 

@@ -177,7 +177,7 @@ def conducting(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
     )
 
     def leaking(air: Air) -> Callable[[FilmNumbers], FilmNumbers]:
-        # a run is short beside the sorption: the conductance is that of its beginning
+        # sorption is slow compared with a run: the conductance is that at the start of the run
         moist = float(_Moisture(air, sorption).at(np.zeros(1))[0])
         conductance = current / _AT * (max(moist, 0.0) / _REFERENCE) ** power
 
