@@ -388,7 +388,8 @@ class Learner:
 
         It is the cross-spectrum of measurement and prediction over the power of the prediction, in
         bands of ``ratio_octaves``, where that power is well above the noise. In between it is
-        interpolated, beyond it stays. Its size and its phase are kept within those of the settings.
+        interpolated, beyond it stays. At the slowest line its size and its phase are kept within
+        those of the settings.
         """
         settings = self._settings
         moved, more = (
@@ -407,11 +408,10 @@ class Learner:
         if told.size == 0:
             return np.ones(moved.size, dtype=complex), 1
         ratio = (around((moved + more) * np.conj(moved)) / np.maximum(power, noise))[told]
-        size = np.clip(np.abs(ratio), 1.0 / settings.ratio_max, settings.ratio_max)
+        size = np.clip(np.abs(ratio[0]), 1.0 / settings.ratio_max, settings.ratio_max)
         most = np.radians(settings.phase_max_deg)
-        phase = np.clip(np.angle(ratio), -most, most)
-        found = size * np.exp(1j * phase)
-        whole = np.interp(lines, told, found.real) + 1j * np.interp(lines, told, found.imag)
+        ratio[0] = size * np.exp(1j * np.clip(np.angle(ratio[0]), -most, most))
+        whole = np.interp(lines, told, ratio.real) + 1j * np.interp(lines, told, ratio.imag)
         whole[0] = abs(whole[0])
         return whole, max(int(told[-1]), 1)
 

@@ -24,13 +24,14 @@ class LearningSettings:
         Largest |Q| W that is learned with: the error of a run is at most this part of the last
         one's. W may be a quarter larger than it was seen before an error grows anywhere.
     ratio_max, phase_max_deg
-        Largest ratio of the film's response to the model's, and its largest phase, that are
+        Largest ratio of the film's slowest response to the model's, and its largest phase, that are
         corrected for. With a ratio of g exp(i phi) learning by the model alone converges where
-        |1 - g exp(i phi)| < 1: up to g = 2, or to phi = 60 deg. Beyond, the model is wrong in
-        another way than a ratio corrects for. The smallest ratio is the inverse of the largest.
+        |1 - g exp(i phi)| < 1: up to g = 2, or to phi = 60 deg. Beyond, it is another film, or the
+        sign of the laser is wrong. The smallest ratio is the inverse of the largest. Faster, what
+        was measured is believed: the film or its stand may resonate where the model does not.
     ratio_octaves
-        Width of the bands from which the ratio is taken. Lines of a path that is no sine are at
-        least so near to each other, and a resonance that the model has, a little off, is as wide.
+        Width of the bands from which the ratio is taken: that at half of the power of a resonance
+        with a damping ratio of 0.035.
     octaves
         Width of the bands in which errors are compared, and twice that by which the band of Q is
         widened or narrowed at once: Q falls over an octave, so a run tells of one more than it
@@ -67,7 +68,7 @@ class LearningSettings:
     contraction: float = 0.8
     ratio_max: float = 2.0
     phase_max_deg: float = 60.0
-    ratio_octaves: float = 0.5
+    ratio_octaves: float = 0.1
     octaves: float = 2.0
     step_backs: int = 2
     spike: float = 8.0

@@ -42,6 +42,7 @@ DRIFT = "drift"
 _GAIN = 0.5  # of chi-square: what is left to gain changes no choice, whose odds are 12
 _GAIN_PART = 1e-3  # of chi-square: the same, where more than twice the noise's power is left
 _POLISHED = 2.0  # mean square over noise: what leaves more only polishes a misfit
+_SAID_PART = 0.01  # of chi-square: the error of a model without effects is said to half a per cent
 _NO_WEIGHT = 1e-6  # of the typical one: what the bounds of a descent leave of a weight at 0
 _AT_ONCE = 1e-3  # s: a branch that relaxes faster than any record shows
 _BASELINE_STARTS = 5  # of the global search
@@ -358,12 +359,15 @@ class Fitter:
             known = None
         return self.descend(problem, fit.x, iterations, known)
 
-    def refined(self, fit: Fit) -> Fit:
-        """Return ``fit`` at the end of its valley: secants first, then Levenberg-Marquardt."""
+    def refined(self, fit: Fit, part: float = _GAIN_PART) -> Fit:
+        """Return ``fit`` at the end of its valley: secants first, then Levenberg-Marquardt.
+
+        Where the noise is not near, that is where so small a ``part`` of chi-square is left to gain.
+        """
         problem = fit.problem
         if problem.fidelity == kernel.ROUGH:
             problem = self.problem(problem.layout.base, fit.drift)
-        gain = _gain(fit)
+        gain = _gain(fit, part)
         found = descend_broyden(problem, fit.x, fit.fixed, None, 40, gain, True)
         found = descend(problem, found.x, fit.fixed, _TO_THE_END, gain, 1e-3, quick=True)
         return fit_of(problem, fit.fixed, found)
@@ -423,16 +427,19 @@ class Fitter:
         return self.refined(replace(best, problem=self.problem(best.model)))
 
     def _from_springs(
-        self, problem: WhitenedProblem, progress: Callable[[str, float], None]
+        self,
+        problem: WhitenedProblem,
+        progress: Callable[[str, float], None],
+        part: float = _GAIN_PART,
     ) -> Fit:
-        """Return the best fit from several starts of the springs, to the end of its valley."""
+        """Return the best fit from several starts of the springs, ``refined`` to a ``part``."""
         starts = voltage_starts(problem, progress, _BASELINE_STARTS)
         fits = self.map(lambda x: self.descend(problem, x, 8), list(starts))
         leaders = sorted(fits, key=lambda f: f.cost)[:2]
         fits = self.map(
             lambda f: self.descend(problem, f.x, _BASELINE_ITERATIONS, sure=True), leaders
         )
-        return self.refined(min(fits, key=lambda f: f.cost))
+        return self.refined(min(fits, key=lambda f: f.cost), part)
 
     def identified(self, baseline: Fit, iterations: int) -> Fit:
         """Return the model without effects as ``identify`` fits it, on every sample.
@@ -455,20 +462,20 @@ class Fitter:
         drag[shortest], drag[modulus] = _AT_ONCE, own[modulus] * own[shortest] / _AT_ONCE
         starts = np.clip(layout.coordinates(np.array([own, drag])), layout.lower, layout.upper)
         wide = [
-            self._from_springs(problem, lambda *_: None),
+            self._from_springs(problem, lambda *_: None, _SAID_PART),
             *self.map(
                 lambda x: self.descend(problem, x, _BASELINE_ITERATIONS, sure=True), list(starts)
             ),
         ]
         best = min(wide, key=lambda f: f.cost)
-        fixed, gain = best.fixed, _gain(best)
-        found = descend(problem, best.x, fixed, _BASELINE_ITERATIONS, damping=1e-4, quick=True)
+        fixed, gain = best.fixed, _gain(best, _SAID_PART)
+        found = descend(problem, best.x, fixed, _BASELINE_ITERATIONS, gain, 1e-4, quick=True)
         none = np.zeros_like(fixed)
         freed = descend(problem, found.x, none, _BASELINE_ITERATIONS, gain, quick=True)
         if is_worth_freeing(problem, found.cost, freed, int(fixed.sum())):
             found, fixed = freed, none
         every = self.careful_problem(baseline.model, 0.0, layout)
-        found = descend(every, found.x, fixed, iterations, gain, damping=1e-4)
+        found = descend(every, found.x, fixed, iterations, gain, 1e-4, quick=True)
         fits.append(fit_of(every, fixed, found))
         return min(fits, key=lambda f: f.cost)
 
@@ -496,9 +503,12 @@ class Fitter:
         return fit_of(problem, fixed, found)
 
 
-def _gain(fit: Fit) -> float:
-    """Return the gain of chi-square below which a descent from ``fit`` has ended."""
-    return _GAIN if fit.cost < _POLISHED else _GAIN_PART * fit.cost * fit.problem.samples
+def _gain(fit: Fit, part: float = _GAIN_PART) -> float:
+    """Return the gain of chi-square below which a descent from ``fit`` has ended.
+
+    Where much more than noise is left, it is a ``part`` of that.
+    """
+    return _GAIN if fit.cost < _POLISHED else part * fit.cost * fit.problem.samples
 
 
 def spring_count(layout: Layout) -> int:

@@ -34,7 +34,7 @@ _TOLD = 1e-10
 _POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: tolerance of its crossing
 _NEAR_A_LIMIT = 0.3  # the same for an undetermined limit, which is bounded to decades only
-_SHORTER = np.array([1.0, 0.5, 0.25, 0.1, 0.03])  # of a step: tried at once
+_SHORTER = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, tried in turn
 _BY_CHANCE = 0.01  # significance level: share of white noise that the test rejects
 _GUESS_MAX = 1e4  # thresholds above the optimum from which a refit takes a few iterations
 
@@ -176,9 +176,9 @@ class _Path:
     second: np.ndarray
     sigma: float
 
-    def ahead(self, points: np.ndarray) -> np.ndarray:
-        """Return extrapolated parameters (P, d) at ``points`` (P,) of the moved parameter."""
-        s = (points - self.start[self.index])[:, None]
+    def ahead(self, point: float) -> np.ndarray:
+        """Return the extrapolated parameters (d,) at a ``point`` of the moved parameter."""
+        s = point - self.start[self.index]
         return self.start + self.first * s + 0.5 * self.second * s * s
 
 
@@ -205,6 +205,21 @@ def _path(
         bend = np.diff(predicted / problem.sigma, 2, axis=0)[0] / probe**2
         second[others] = -inverse @ (j.T @ bend)
     return _Path(index, best, first, second, sigma)
+
+
+def _guess(
+    problem: Problem, path: _Path, point: float, held: np.ndarray, reach: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return parameters (d,) from which the refit at ``point`` starts, and their cost."""
+    layout = problem.layout
+    moved = path.start + np.clip(path.ahead(point) - path.start, -reach, reach)
+    moved = np.where(held, path.start, np.clip(moved, layout.lower, layout.upper))
+    # where the data hardly determine the others, the path is wrong: try them unmoved too
+    both = np.stack([moved, path.start])
+    both[:, path.index] = point
+    costs = problem.costs(both)
+    better = int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))
+    return both[better], float(costs[better])
 
 
 def profile(
@@ -245,29 +260,20 @@ def profile(
         for _ in range(_POINTS_MAX):
             tick()
             # the parabola holds only locally: the longest step with a usable extrapolation is taken
-            shorter = _SHORTER if math.isinf(outside) else _SHORTER[:1]
-            points = np.clip(
-                inside + sign * step * shorter, layout.lower[index], layout.upper[index]
-            )
-            moved = path.start + np.clip(path.ahead(points) - path.start, -reach, reach)
-            moved = np.where(held, best, np.clip(moved, layout.lower, layout.upper))
-            # where the data hardly determine the others, the path is wrong: try them unmoved too
-            both = np.stack([moved, np.tile(path.start, (points.size, 1))])
-            both[..., index] = points
-            costs = problem.costs(both.reshape(-1, layout.size)).reshape(2, -1)
-            nearer = np.argmin(np.where(np.isfinite(costs), costs, np.inf), axis=0)
-            guesses = both[nearer, np.arange(points.size)]
-            excess = costs[nearer, np.arange(points.size)] * problem.samples - chi2
-            good = np.flatnonzero(excess < _GUESS_MAX * threshold)
-            chosen = int(good[0]) if good.size else points.size - 1
-            point = float(points[chosen])
+            for part in _SHORTER if math.isinf(outside) else _SHORTER[:1]:
+                point = float(
+                    np.clip(inside + sign * step * part, layout.lower[index], layout.upper[index])
+                )
+                guess, cost = _guess(problem, path, point, held, reach)
+                if cost * problem.samples - chi2 < _GUESS_MAX * threshold:
+                    break
             at_bound = sign * (point - bound) >= 0.0
             step_before = abs(point - inside)
-            # a fraction of the threshold
-            gain = 0.03 * threshold
+            # as much as moves the crossing by its tolerance: the quadratic model's word is taken
+            gain = 2.0 * near * threshold
             fit = descend(
                 problem,
-                guesses[chosen],
+                guess,
                 fixed,
                 iterations=8,
                 gain=gain,
@@ -275,7 +281,8 @@ def profile(
                 patience=2,
                 quick=True,
             )
-            z = math.sqrt(max(fit.cost * problem.samples - chi2, 0.0) / threshold)
+            excess = fit.cost * problem.samples - fit.to_gain - chi2
+            z = math.sqrt(max(excess, 0.0) / threshold)
             if abs(z - 1.0) < near:
                 end = point
                 break

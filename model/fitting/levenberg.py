@@ -26,7 +26,8 @@ class LocalFit:
     """End of a descent: coordinates ``x`` (d,), mean-square cost, residuals (N,).
 
     ``jacobian`` (N, f) over the free coordinates is that of the last iteration: at ``x`` where the
-    descent converged, else one step before.
+    descent converged, else one step before. ``to_gain`` is what the quadratic model at ``x`` would
+    still take off chi-square, 0 where there is none at ``x``.
     """
 
     x: np.ndarray
@@ -35,6 +36,7 @@ class LocalFit:
     jacobian: np.ndarray
     iterations: int
     converged: bool
+    to_gain: float = 0.0
 
 
 def descend(
@@ -70,7 +72,7 @@ def descend(
     jac = np.zeros((r.size, scale.size))
     history = [chi2]
     converged = not free.any()
-    done = 0
+    done, to_gain = 0, 0.0
     while done < iterations and not converged:
         done += 1
         jac = problem.jacobian(x, free, r if quick else None)
@@ -90,8 +92,9 @@ def descend(
         target = q.T @ (gradient / safe)[move]
         enough = gain_that_counts(chi2, problem.samples) if gain is None else gain
         # gain that the quadratic model predicts, flat directions excepted
-        if float(np.sum(target**2 / np.maximum(w, _FLAT))) < enough:
-            converged = True
+        predicted = float(np.sum(target**2 / np.maximum(w, _FLAT)))
+        if predicted < enough:
+            converged, to_gain = True, predicted
             break
         improved = False
         while not improved and damping <= _DAMPING_MAX:
@@ -118,7 +121,7 @@ def descend(
         r = problem.residuals(x)
         history.append(chi2)
         converged = len(history) > patience and history[-1 - patience] - chi2 < enough
-    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged)
+    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged, to_gain)
 
 
 def gain_that_counts(chi2: float, samples: int) -> float:
