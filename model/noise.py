@@ -31,7 +31,8 @@ LEAD_IN, DIFFERENCES = "lead-in", "second differences"
 #: Fewer readings have no second difference to average.
 READINGS_MIN = 4
 _READINGS_A_LINE = 4  # samples for each of the three numbers of a periodic line
-_SLOWEST_LINE = 15.0  # Hz; slower ones may be drift, or noise that a sensor has averaged
+_SLOW = 15.0  # Hz: a slower line may be drift, 1/f noise, or noise that a sensor has averaged
+_SLOWER = 3  # lines of a spectrum at least that are slower than a slow one, and lower
 _STANDS_OUT = 30.0  # times the spectrum's median about it: by chance once in a million readings
 #: Degrees of freedom of Student's t, of finite variance; above 30 it is normal in 99.9 % of itself.
 _FREEDOMS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0)
@@ -179,14 +180,24 @@ def _strongest_line(t: np.ndarray, values: np.ndarray) -> np.ndarray | None:
     n = values.size
     power = np.abs(np.fft.rfft(values)) ** 2
     bin_width = 1.0 / (n * float(t[1] - t[0]))
-    slowest = math.ceil(_SLOWEST_LINE / bin_width)
-    if slowest >= power.size:
-        return None
-    peak = slowest + int(np.argmax(power[slowest:]))
     half = power.size // 16 + 4
-    about = power[np.clip(np.arange(peak - half, peak + half + 1), 0, power.size - 1)]
-    if not power[peak] > _STANDS_OUT * float(np.median(about)):
-        return None
+    fast = math.ceil(_SLOW / bin_width)
+    # the mean is no line, and a neighbour of a line is part of it
+    for first, end in ((fast, power.size), (_SLOWER + 2, min(fast, power.size))):
+        if first >= end:
+            continue
+        peak = first + int(np.argmax(power[first:end]))
+        about = float(np.median(power[max(peak - half, 1) : peak + half + 1]))
+        if peak < fast:
+            # of noise that is slow, what is slower is larger
+            about = max(about, float(np.median(power[1 : peak - 1])))
+        if power[peak] > _STANDS_OUT * about:
+            return _sine(t, values, peak * bin_width, bin_width)
+    return None
+
+
+def _sine(t: np.ndarray, values: np.ndarray, near: float, bin_width: float) -> np.ndarray:
+    """The sine (N,) that leaves least of ``values`` (N,), within a bin of ``near`` Hz."""
 
     def sine(frequency: float) -> np.ndarray:
         turn = 2.0 * np.pi * frequency * t
@@ -195,8 +206,8 @@ def _strongest_line(t: np.ndarray, values: np.ndarray) -> np.ndarray | None:
 
     best = _minimum(
         lambda f: float(np.sum((values - sine(f)) ** 2)),
-        (peak - 1.0) * bin_width,
-        (peak + 1.0) * bin_width,
+        near - bin_width,
+        near + bin_width,
         _LINE_FOUND * bin_width,
     )
     return sine(best)

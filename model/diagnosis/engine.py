@@ -238,12 +238,13 @@ class Search:
         left = fit.members - {name}
         if (fit.members, name) in self._left_out:
             return self.fits[left]
-        self._left_out.add((fit.members, name))
         known = dict(zip(fit.problem.layout.names, fit.x, strict=True))
         effects = tuple(e for e in fit.model.effects if e[0] != name)
         problem = self.fitter.problem(replace(fit.model, effects=effects), fit.drift)
         x = np.array([known[n] for n in problem.layout.names])
-        return self.keep(self.fitter.refined(self.fitter.descend(problem, x, 20)))
+        found = self.keep(self.fitter.refined(self.fitter.descend(problem, x, 20)))
+        self._left_out.add((fit.members, name))  # not before: the fit may end the search
+        return found
 
     def _say(self, what: str, before: Fit, after: Fit) -> None:
         """Log a choice: members and costs before and after, the gain, and the work until now."""

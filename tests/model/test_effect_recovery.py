@@ -46,6 +46,7 @@ LARGER = {
     "restless drift": 3.0,
     "fitful drift": 3.0,
     "mains interference": 2.0,
+    "vibration": 2.0,
     "sensor curvature": 3.0,
     "sensor bend": 3.0,
     "slow branch": 3.0,
@@ -68,7 +69,7 @@ IN_FILMS = {
     "general softening": {"reach": 0.5},
 }
 # a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
-NEARER = {"mains interference": 1.00005, "sensor ripple": 1.05}
+NEARER = {"mains interference": 1.00005, "vibration": 1.00005, "sensor ripple": 1.05}
 NEARER |= dict.fromkeys(("amplifier limit", "sensor saturation"), 0.8)
 NEARER |= dict.fromkeys(
     (

@@ -279,11 +279,11 @@ def shown_by_two_lags(p, time):
     ).y[1]  # fmt: skip
 
 
-def mains(p, t):
+def lines(p, t, harmonic, number):
     turn = 2.0j * math.pi * p["frequency"] * t
     first = (p["cosine"] - 1j * p["sine"]) * np.exp(turn)
-    third = (p["third_cosine"] - 1j * p["third_sine"]) * np.exp(3.0 * turn)
-    return moved(t)[0] + (first + third).real
+    more = (p[f"{harmonic}_cosine"] - 1j * p[f"{harmonic}_sine"]) * np.exp(number * turn)
+    return moved(t)[0] + (first + more).real
 
 
 def shown_by_walk(p, t):
@@ -294,7 +294,8 @@ def shown_by_walk(p, t):
 
 SHOWN = {
     "linear drift": lambda p, t: moved(t)[0] + p["drift"] * t,
-    "mains interference": mains,
+    "mains interference": lambda p, t: lines(p, t, "third", 3.0),
+    "vibration": lambda p, t: lines(p, t, "second", 2.0),
     "general sensor curve": lambda p, t: (
         moved(t)[0]
         + np.array(

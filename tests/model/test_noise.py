@@ -30,6 +30,24 @@ def test_mains_is_no_noise(rate, samples):
         assert noise_at_rest(time, noise) == pytest.approx(noise.std(ddof=2), rel=0.01)
 
 
+@pytest.mark.parametrize(("size", "hertz", "half_life"), [(16.0, 3.6, 4.2), (3.0, 6.0, 1.0)])
+def test_a_load_that_swings_at_rest_is_no_noise(size, hertz, half_life):
+    rng = np.random.default_rng(5)
+    time = np.arange(400) / 200.0
+    for phase in np.arange(0.0, 6.0, 0.5):
+        swing = size * 2.0 ** (-time / half_life) * np.sin(2.0 * np.pi * hertz * time + phase)
+        assert noise_at_rest(time, rng.standard_normal(400) + swing) < 1.6
+
+
+def test_slow_noise_is_noise():
+    rng = np.random.default_rng(6)
+    time = np.arange(400) / 200.0
+    for _ in range(20):
+        walk = rng.standard_normal(400) + 0.5 * np.cumsum(rng.standard_normal(400))
+        straight = walk - np.polyval(np.polyfit(time, walk, 1), time)
+        assert noise_at_rest(time, walk) == pytest.approx(straight.std(ddof=2), rel=1e-6)
+
+
 def test_noise_that_a_sensor_has_averaged_is_noise():
     rng = np.random.default_rng(4)
     time = np.arange(400) / 200.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -147,6 +148,18 @@ def test_a_search_keeps_what_it_has_fitted_when_its_work_ends(monkeypatch) -> No
     assert [step.family for step in found.steps] == ["sensor_nonlinearity"]
 
 
+def test_a_fit_in_which_the_work_ended_is_made_again(monkeypatch) -> None:
+    fitter = Fitter([record_of(plant("sensor curvature"))], PLAIN, DiagnosisSettings(), 1)
+    search = engine.Search(fitter, lambda *_: None, lambda: False)
+    problem = fitter.problem(plant("sensor curvature"))
+    fit = fitter.descend(problem, problem.layout.coordinates(problem.layout.initial()), 3)
+    with monkeypatch.context() as ended:
+        ended.setattr(fitter, "watched", Mock(side_effect=engine.Spent))
+        with pytest.raises(engine.Spent):
+            search.without(fit, "sensor curvature")
+    assert search.without(fit, "sensor curvature").effects == ()
+
+
 def after_rest(way: np.ndarray) -> ActuatorRecord:
     """The plain film after 4 s at 0 V, its reading off by ``way`` (N,) m."""
     drive = thesis_drive()
@@ -156,6 +169,22 @@ def after_rest(way: np.ndarray) -> ActuatorRecord:
     reading = plain.displacement + way - way[:400].mean()
     noise = noise_at_rest(time[:400], reading[:400])
     return replace(plain, displacement=reading, noise=noise, lead_in=400)
+
+
+def test_a_load_that_swings_at_rest_is_not_taken_for_noise() -> None:
+    time = np.arange(400 + thesis_drive().time.size) / 100.0
+    swing = 2e-5 * 2.0 ** (-time / 4.0) * np.sin(2.0 * np.pi * 3.4 * time)
+    found = diagnose([after_rest(swing)], PLAIN, workers=1)
+    assert found.verdict != "nothing_missing"
+    assert found.baseline.cost > 2.0
+
+
+def test_a_bench_that_vibrates_is_told_by_its_line() -> None:
+    time = np.arange(400 + thesis_drive().time.size) / 100.0
+    turn = 2.0 * np.pi * 23.7 * time
+    found = diagnose([after_rest(3e-6 * np.sin(turn) + 1e-6 * np.cos(2.0 * turn))], PLAIN)
+    assert [step.effect for step in found.steps] == ["vibration"]
+    assert found.verdict == "explained"
 
 
 def test_slow_noise_of_a_sensor_is_noise_and_a_drift_is_a_drift() -> None:
