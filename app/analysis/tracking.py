@@ -217,7 +217,8 @@ class Tracking:
         The voltages of a linear map and of this model are proposed before. Where it predicts its
         own run significantly better than ``model`` does, it is followed in place of ``model``: a
         model is falsified by data that were recorded under another voltage, before it is used (M.
-        G. Safonov and T.-C. Tsao, IEEE Trans. Automatic Control 42, 843 (1997)).
+        G. Safonov and T.-C. Tsao, IEEE Trans. Automatic Control 42, 843 (1997)). Where learning by
+        ``model`` ends above the noise, it goes on from the run of this model.
     within : float
         Distance in m from the target that is accepted.
 
@@ -249,6 +250,7 @@ class Tracking:
         self.target, self.model, self.within = target, model, within
         self._followed = model
         self._compare = compare
+        self._given_up: tuple[Learner, ModelFile] | None = None
         ours = _actuator(model, "--model")
         self.task = task_of(target, rig_file)
         self._iterations = iterations
@@ -299,7 +301,7 @@ class Tracking:
                 samples=lesson.samples,
                 edge=0.0 if last else lesson.edge,
                 contraction=math.nan if last else lesson.contraction,
-                notes=(*run.notes, *lesson.notes),
+                notes=(*run.notes, *lesson.notes, *self._other_tried()),
             )
         self.runs = (*self.runs, run)
         self.proposed = self._next()
@@ -370,14 +372,43 @@ class Tracking:
             if np.isfinite(mine).all() and worse <= LearningSettings().significant * scatter:
                 return ()
             off = min(off, float(np.sqrt(np.mean((measured - mine) ** 2))) * 1e6)
-        task = replace(self.task, target=self.inversion.reference)
-        model = _actuator(theirs, "--compare")
-        self._learner = Learner(model, task, alternatives=alternatives_of(theirs))
-        self._followed = theirs
+        self._learner, self._followed = self._learner_of(theirs), theirs
         less = float(np.sqrt(np.mean(other**2))) * 1e6
         return (
             f"the model {self.model.name!r} predicts this run with an error of {off:.3g} um, the "
             f"compared one with {less:.3g} um: the compared model is followed",
+        )
+
+    def _learner_of(self, compare: ModelFile) -> Learner:
+        """Return a learner by the compared model, for the same reference."""
+        task = replace(self.task, target=self.inversion.reference)
+        model = _actuator(compare, "--compare")
+        return Learner(model, task, alternatives=alternatives_of(compare))
+
+    def _other_tried(self) -> tuple[str, ...]:
+        """Go on from the compared model's run where learning has ended above the noise.
+
+        What the model has and the film has not, a sharp resonance for example, stands in the way of
+        what runs could teach. Where both end above it, the better voltage is kept. What is said is
+        returned.
+        """
+        now, theirs = (self._learner, self._followed), self._compare
+        if not self._learner.settled or self._learner.is_at_noise or theirs is None:
+            return ()
+        if self._given_up is not None:
+            if self._given_up[0].best_rms < self._learner.best_rms:
+                (self._learner, self._followed), self._given_up = self._given_up, now
+            return ()
+        run = next((run for run in self.runs if run.kind == "thesis"), None)
+        if self._followed is theirs or run is None:
+            return ()
+        other = self._learner_of(theirs)
+        if not other.learn(run.measured, run.noise).learned:
+            return ()
+        self._given_up, self._learner, self._followed = now, other, theirs
+        return (
+            f"learning by the model {now[1].name!r} has ended above the noise: it goes on from the "
+            f"run of the compared model",
         )
 
     def _measured(

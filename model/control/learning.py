@@ -17,11 +17,11 @@ from run to run, at every frequency, where
 The ratio r of the film's response to the model's is that of the first run, where the path has
 power: learning by the measured response, as K.-S. Kim and Q. Zou, IEEE/ASME Trans. Mechatronics 18,
 1767 (2013), but nothing is divided by what was not excited. W is taken from the model's uncertainty
-(``alternatives``) and from the runs: the ratio of the spectra of what r leaves and of the
-prediction, over two octaves. After a run that has learned, it is the part of the error that is left
-in the band that was learned. Beyond what was seen W grows with the square of the frequency, as the
-error of a mass does. The filter Q of no phase passes what keeps |Q| W below ``CONTRACTION``. Where
-nothing does, nothing is learned.
+(``alternatives``) where no run has shown it, else from the runs: the ratio of the spectra of what r
+leaves and of the prediction, over two octaves. After a run that has learned, it is the part of the
+error that is left in the band that was learned. Beyond what was seen W grows with the square of the
+frequency, as the error of a mass does. The filter Q of no phase passes what keeps |Q| W below
+``CONTRACTION``. Where nothing does, nothing is learned.
 
 What a run had alone, noise and a drift of the sensor, is learned as well as what repeats, and makes
 the next run worse by its own power. So a step counts only if the mean square error falls by more
@@ -176,6 +176,11 @@ class Learner:
     def expected(self) -> np.ndarray:
         """The displacement (N,) in m that is expected of the next run."""
         return self._now.reading + self._known
+
+    @property
+    def is_at_noise(self) -> bool:
+        """Whether nothing more is learned because the error is noise."""
+        return self.settled == _IS_NOISE
 
     @property
     def best_rms(self) -> float:
@@ -333,7 +338,7 @@ class Learner:
         """Return the edge in Hz of Q, and the largest |Q| W with it; 0 where nothing passes."""
         settings = self._settings
         highest, least = self._edge, self._rate / self.first.time.size
-        off = self._off_by_prediction(run.lacking)
+        off, seen = self._off_by_prediction(run.lacking)
         if self._learned is not None and self._learned.before is not run.left:
             before, learned = self._learned.before, self._learned.edge
             left = self._left(before, run.left)
@@ -349,7 +354,7 @@ class Learner:
                 # no wider: it still shrinks as a whole, or it does not
                 shrinks = np.sum(run.left[band] ** 2) < np.sum(before[band] ** 2)
                 return min(highest, learned if shrinks else learned / settings.widening), worst
-        off = np.maximum(off, self._uncertain)
+        off = np.where(seen, off, np.maximum(off, self._uncertain))
         edge = min(highest, _widest(self._frequency, off, settings.contraction))
         if edge <= least:
             return 0.0, np.nan
@@ -364,8 +369,11 @@ class Learner:
         part = np.sqrt(np.maximum(left - noise, 0.0) / np.maximum(had, noise))
         return np.where(told, part, np.nan)
 
-    def _off_by_prediction(self, lacking: np.ndarray) -> np.ndarray:
-        """Return W (M,) from what the model ``lacking`` (N,) m shows in a run."""
+    def _off_by_prediction(self, lacking: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return W (M,) from what the model ``lacking`` (N,) m shows in a run, and where it does.
+
+        Where (M,) the path has too little power, the value is interpolated.
+        """
         noise = self._noise_around(int(np.count_nonzero(self._inside)))
         more, moved = (
             np.fft.rfft(np.where(self._inside, row, 0.0)) for row in (lacking, self._now.reading)
@@ -374,14 +382,16 @@ class Learner:
         shown, predicted = self._around(np.abs(more + moved - expected)), self._around(expected)
         told = np.flatnonzero(predicted > self._settings.told * noise)
         if told.size == 0:
-            return np.full(shown.size, np.inf)
+            return np.full(shown.size, np.inf), np.zeros(shown.size, dtype=bool)
         ratio = np.sqrt(np.maximum(shown - noise, 0.0)[told] / predicted[told])
         lines = np.arange(shown.size)
         off, last = np.interp(lines, told, ratio), self._told_up_to
         # what the ratio corrects for at the last line of the path grows beyond it
         corrected = abs(self._ratio[last] / abs(self._ratio[0]) - 1.0)
         grown = max(off[last], corrected) * (lines / last) ** 2
-        return np.where(lines > last, np.maximum(off, grown), off)
+        seen = np.zeros(shown.size, dtype=bool)
+        seen[told] = True
+        return np.where(lines > last, np.maximum(off, grown), off), seen
 
     def _film_over_model(self, lacking: np.ndarray) -> tuple[np.ndarray, int]:
         """Return the film's response over the model's (M,), and the last line that tells of it.

@@ -100,6 +100,27 @@ def test_a_wrong_model_learns(learned):
     assert learned.status == "complete"
 
 
+RINGING = ModelFile(
+    "ringing",
+    Actuator(
+        THESIS_FILM,
+        THESIS_LOAD,
+        TABLE_3,
+        (("attached mode", (("stiffness", 1.7e5), ("frequency", 5.0), ("damping", 1e-3))),),
+    ),
+)
+
+
+def test_where_a_model_stands_in_the_way_the_compared_one_learns(tmp_path):
+    found = followed(tmp_path / "out", RINGING, compare=WRONG, iterations=5)
+    ours = [run for run in found.runs if run.kind in ("model", "learned")]
+    said = [run.iteration for run in ours if any("it goes on from" in n for n in run.notes)]
+    assert len(said) == 1
+    assert ours[said[0]].rms > 2.0 * found.noise
+    assert "stiffer" in open_recording(ours[said[0] + 1].recording).model_toml
+    assert ours[-1].rms < 0.7 * ours[said[0]].rms
+
+
 def test_every_run_is_a_recording_with_its_origin(learned):
     for run in learned.runs:
         recording = open_recording(run.recording)
