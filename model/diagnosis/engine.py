@@ -9,10 +9,11 @@ import numpy as np
 
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import Fit, Fitter
+from dearig.model.diagnosis.preparation import has_line_at_rest
 from dearig.model.diagnosis.race import Candidate, race
 from dearig.model.diagnosis.regression import Regression, is_unseen
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
-from dearig.model.effects import EFFECTS
+from dearig.model.effects import EFFECTS, Effect
 from dearig.model.environment import recorded_of
 from dearig.model.records import ActuatorRecord
 
@@ -80,6 +81,7 @@ class Search:
         self.races: list[Race] = []
         self._left_out: set[tuple[frozenset[str], str]] = set()
         self._searching, self._done = False, 0.0
+        self._at_rest = ""  # the effect that the readings at rest have shown
         drive = "voltage" if fitter.of_actuator else "stretch"
         drives = [r.drive for r in fitter.full if isinstance(r, ActuatorRecord)]
         there = set(recorded_of([d.temperature for d in drives], [d.humidity for d in drives]))
@@ -143,6 +145,7 @@ class Search:
     def _searched(self, baseline: Fit) -> Fit:
         """Laws are sought in white noise and in drift, the more promising first."""
         judge = self.judge
+        baseline = self._humming(baseline)
         settled = judge.is_settled(baseline)
         if settled and baseline.problem.noise_drift is None:
             return baseline
@@ -169,6 +172,23 @@ class Search:
             beside = self._grown(drifting, None)
         judge.see([lawful, beside])
         return min(lawful, beside, key=judge.criterion)
+
+    def _humming(self, baseline: Fit) -> Fit:
+        """Return ``baseline`` with interference where the readings at rest have a line.
+
+        What is there without a voltage is no answer of the film, and stands before all that is.
+        """
+        laws = [e for e in self.effects if e.family == "interference"]
+        if not laws or not any(map(has_line_at_rest, self.fitter.full)):
+            return baseline
+        fits = self._raced(baseline, laws)
+        self.judge.see([baseline, *fits])
+        if not (fits and self.judge.is_worth(baseline, fits[0])):
+            return baseline
+        self._say("hums", baseline, fits[0])
+        self.races[-1] = replace(self.races[-1], taken=fits[0])
+        (self._at_rest,) = fits[0].effects
+        return fits[0]
 
     def _drifting(self, parent: Fit) -> Fit | None:
         """Return ``parent`` with drift in the noise; None where white noise is as probable."""
@@ -210,6 +230,8 @@ class Search:
         for name in best.effects:
             if self.judge.is_settled(best) or name not in best.effects:
                 break
+            if name == self._at_rest:
+                continue
             fits = self._raced(self.without(best, name))
             self.judge.see([best, *fits])
             if fits and fits[0].members != best.members and self.judge.gain(best, fits[0]) > 1.0:
@@ -256,15 +278,21 @@ class Search:
 
     # -- one race
 
-    def _raced(self, parent: Fit, pairs: bool = False) -> list[Fit]:
-        """Return the fits of one more effect each, or of two, the most probable first."""
+    def _raced(
+        self, parent: Fit, among: Sequence[Effect] | None = None, pairs: bool = False
+    ) -> list[Fit]:
+        """Return the fits of one more effect each, or of two, the most probable first.
+
+        They are ``among`` all effects where nothing else is said.
+        """
         # how many races there will be is not known: each is taken for a third of what is left
         self._done += (1.0 - self._done) / 3.0
         self.progress(
             f"candidates beside {' + '.join(sorted(parent.members)) or 'the baseline'}", self._done
         )
         regression, extent = self._regression(parent)
-        effects = [e for e in self.effects if e.name not in parent.effects]
+        among = self.effects if among is None else among
+        effects = [e for e in among if e.name not in parent.effects]
         starts = regression.starts(effects, extent)
         fits = self._run(
             parent,

@@ -17,6 +17,7 @@ from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
 __all__ = [
     "FILM_MODEL_ERROR",
     "bridged",
+    "has_line_at_rest",
     "prepared",
     "with_model_error",
     "without_tails",
@@ -71,6 +72,22 @@ def _thinned(record: Record, model: Actuator | Strip) -> Record:
     return replace(thin, noise=max(thin.noise, noise))
 
 
+def has_line_at_rest(record: Record) -> bool:
+    """Whether something periodic is in the readings before the voltage."""
+    rest = _at_rest(record)
+    if not isinstance(record, ActuatorRecord) or rest.size < _QUIET_MIN:
+        return False
+    _, numbers = about_rest(record.time[rest], record.displacement[rest])
+    return numbers > 2  # of a straight line
+
+
+def _at_rest(record: Record) -> np.ndarray:
+    """Return the places (n,) of the usable readings before the voltage."""
+    lead_in = record.lead_in if isinstance(record, ActuatorRecord) else 0
+    usable = np.arange(lead_in)
+    return usable if record.valid is None else usable[record.valid[:lead_in]]
+
+
 def with_model_error(record: Record) -> Record:
     """Return ``record`` with the error of a film's model in its noise; actuators as they are."""
     if isinstance(record, ActuatorRecord):
@@ -92,7 +109,7 @@ def without_tails(record: Record, residual: np.ndarray) -> Record:
     if not isinstance(record, ActuatorRecord):
         return record
     usable = np.ones(residual.size, dtype=bool) if record.valid is None else record.valid
-    rest = np.flatnonzero(usable[: record.lead_in])
+    rest = _at_rest(record)
     if rest.size < _QUIET_MIN:
         return record
     at_rest, _ = about_rest(record.time[rest], record.displacement[rest])
