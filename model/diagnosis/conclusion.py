@@ -267,7 +267,7 @@ def _label(member: str) -> str:
 
 def _families(end: Conclusion) -> tuple[tuple[str, float], ...]:
     """Return the probability of each family, largest first; they add up to 1."""
-    found = end.judge.probabilities(list(end.found.fits.values()))
+    found = end.judge.probabilities(list(end.found.fits.values()), end.found.sought)
     if not end.is_small and not (end.found.best.members and end.explained > _TRUSTED_SHARE):
         # what no fit explains is of no known family
         left = 1.0 - max(end.explained, 0.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dearig.model.diagnosis.evidence import Judge, family_of
-from dearig.model.diagnosis.fits import Fit, Fitter
+from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
 from dearig.model.diagnosis.preparation import has_line_at_rest
 from dearig.model.diagnosis.race import Candidate, race
 from dearig.model.diagnosis.regression import Regression, is_unseen
@@ -53,7 +53,8 @@ class Race:
 class Found:
     """End of a search: the baseline, the best fit, all others by their members, and the races.
 
-    ``status`` is ``complete``, ``stopped`` or ``budget``.
+    ``sought`` are the families of effects that the search knows. ``status`` is ``complete``,
+    ``stopped`` or ``budget``.
     """
 
     baseline: Fit
@@ -61,6 +62,7 @@ class Found:
     fits: dict[frozenset[str], Fit]
     races: tuple[Race, ...]
     judge: Judge
+    sought: frozenset[str]
     status: str
 
 
@@ -119,7 +121,11 @@ class Search:
             self._searching = False
         if status == "budget" and len(best.members) > 1:
             best = self._pruned(best)
-        return Found(baseline, best, self.fits, tuple(self.races), self.judge, status)
+        sought = {family_of(e.name) for e in self.effects} - {"unknown"}
+        if self.fitter.of_actuator:
+            sought.add(family_of(DRIFT))
+        races = tuple(self.races)
+        return Found(baseline, best, self.fits, races, self.judge, frozenset(sought), status)
 
     def _of_baseline(self, stage: str, fraction: float) -> None:
         # searches with and without stiffening springs each count from 0 to 1

@@ -147,22 +147,36 @@ class Judge:
         enough = not parent.members or (parent.cost - fit.cost) / left > s.share
         return self.gain(parent, fit) > s.odds and parent.cost - fit.cost > s.form_error and enough
 
-    def probabilities(self, fits: Sequence[Fit]) -> dict[str, float]:
+    def probabilities(self, fits: Sequence[Fit], sought: Iterable[str] = ()) -> dict[str, float]:
         """Return the probability of each family: that it is among what is missing.
 
         Sums exp(-C/2t) over ``fits``, each with prior odds of e^(-odds/2) an effect, with the
-        tempering t of the settings. ``none`` is the baseline, ``unknown`` what no fit explains.
+        tempering t of the settings. A family that was ``sought``, and of which there is no fit
+        beside the baseline alone, is taken for one effect of one number that explains nothing: that
+        a record does not show it does not exclude it. ``none`` is the baseline, ``unknown`` what no
+        fit explains.
         """
         if not fits:
             return {"none": 1.0}
         s = self.settings
-        scores = [self.criterion(f) + s.odds * len(f.members) for f in fits]
-        least = min(scores)
-        weights = [math.exp(-0.5 * (score - least) / s.tempering) for score in scores]
+        scores = [
+            (self.criterion(f) + s.odds * len(f.members), {family_of(m) for m in f.members})
+            for f in fits
+        ]
+        alone = {next(iter(families)) for _, families in scores if len(families) == 1}
+        unseen = s.odds + math.log(max(self.samples, 2.0))
+        scores += [
+            (score + unseen, {family})
+            for score, families in scores
+            if not families
+            for family in set(sought) - alone
+        ]
+        least = min(score for score, _ in scores)
+        weights = [math.exp(-0.5 * (score - least) / s.tempering) for score, _ in scores]
         total = sum(weights)
         found: dict[str, float] = {}
-        for fit, weight in zip(fits, weights, strict=True):
-            families = {family_of(m) for m in fit.members} or {"none"}
-            for family in families:
-                found[family] = found.get(family, 0.0) + weight / total / len(families)
+        for weight, (_, families) in zip(weights, scores, strict=True):
+            for family in families or {"none"}:
+                share = weight / total / max(len(families), 1)
+                found[family] = found.get(family, 0.0) + share
         return found

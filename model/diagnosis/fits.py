@@ -362,7 +362,7 @@ class Fitter:
     def refined(self, fit: Fit, part: float = _GAIN_PART) -> Fit:
         """Return ``fit`` at the end of its valley: secants first, then Levenberg-Marquardt.
 
-        Where the noise is not near, that is where so small a ``part`` of chi-square is left to gain.
+        Where the noise is not near, that is where no such ``part`` of chi-square is left to gain.
         """
         problem = fit.problem
         if problem.fidelity == kernel.ROUGH:

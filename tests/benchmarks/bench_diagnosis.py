@@ -3,7 +3,8 @@
 Run as ``python -m tests.benchmarks.bench_diagnosis``. Simulated rigs that hide one effect each (and
 one that hides nothing) are recorded as in the blind test. Beside ``dearig diagnose``: more Maxwell
 branches (4 and 5, of which the better on the validation recordings is shown, more than anybody who
-may not look there could have), and three ways to model the baseline's residual. Everything is
+may not look there could have), every effect fitted alone from the baseline's optimum and chosen by
+BIC (what one would write in a week), and three ways to model the baseline's residual. Everything is
 trained on the same recordings and simulated freely on the same other ones.
 
 The residual's models need packages of their own: sysidentpy, pysindy and scikit-learn. Install them
@@ -24,6 +25,11 @@ from pathlib import Path
 import numpy as np
 
 from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.evidence import family_of
+from dearig.model.diagnosis.fits import Fitter, with_effect
+from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.diagnosis.shapes import typical_values
+from dearig.model.effects import EFFECTS
 from dearig.model.fitting import identify
 from dearig.model.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from dearig.model.records import ActuatorRecord
@@ -42,6 +48,7 @@ FAMILIES = (
     "sensor_lag",
 )
 MORE_BRANCHES = (4, 5)
+FLAT_ITERATIONS = 30  # of each effect
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,8 @@ def main() -> None:
         if package := missing(peer):
             print(f"{peer.name} is left out: {package} is not installed.")
     peers = [peer for peer in PEERS if not missing(peer)]
-    heads = ("hidden (seed)", "before", "branches", *(p.name for p in peers), "dearig diagnose")
+    named = [peer.name for peer in peers]
+    heads = ("hidden (seed)", "before", "branches", "flat BIC", *named, "dearig diagnose")
     print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(Path(folder), given.rate)
@@ -83,7 +91,7 @@ def main() -> None:
         print(
             f"\nValidation RMS in um, three recordings that count the same; noise "
             f"{bench.floor_um():.2f} um; training on {' and '.join(MODES[given.train])}. Only "
-            f"dearig diagnose names a cause: it stands in italics."
+            f"flat BIC and dearig diagnose name a cause: it stands in italics."
         )
     for peer in peers:
         print(f"{peer.name}: {peer.about}.")
@@ -96,7 +104,11 @@ def _row(bench: Bench, case: Case, folder: Path) -> list[str]:
     train, others = records_of(train_paths), records_of(other_paths)
     baseline = _baseline(train)
     before = _pooled([r.displacement - _displacement(baseline, r) for r in others])
-    cells = [f"{before:.2f}", str(_more_branches(train, others, baseline.network))]
+    cells = [
+        f"{before:.2f}",
+        str(_more_branches(train, others, baseline.network)),
+        str(_flat_bic(train, others, baseline)),
+    ]
     courses = [_course(baseline, r) for r in train]
     unseen = [_course(baseline, r) for r in others]
     for peer in PEERS:
@@ -141,6 +153,29 @@ def _more_branches(
         nested = model.network
         reached.append(_pooled([r.displacement - _displacement(model, r) for r in others]))
     return Result(min(reached), time.perf_counter() - started)
+
+
+def _flat_bic(
+    train: Sequence[ActuatorRecord], others: Sequence[ActuatorRecord], plain: Actuator
+) -> Result:
+    """The one effect, or none, of least n ln(mean square) + k ln n; each begins at the baseline."""
+    started = time.perf_counter()
+    fitter = Fitter(train, plain, DiagnosisSettings())
+    baseline = fitter.baseline(lambda *_: None)
+    fits = [baseline]
+    for name, effect in EFFECTS.items():
+        if "voltage" in effect.drives and not effect.needs:
+            values = typical_values(effect)
+            problem = fitter.problem(with_effect(baseline.model, name, values))
+            start = fitter.start_of(problem, baseline.x, ((name, values),))
+            fits.append(fitter.descend(problem, start, FLAT_ITERATIONS))
+    n = baseline.problem.samples
+    best = min(fits, key=lambda f: n * math.log(f.cost) + f.free * math.log(n))
+    if not isinstance(best.model, Actuator):
+        raise TypeError("an actuator's records were fitted by something else")
+    left = [r.displacement - _displacement(best.model, r) for r in others]
+    says = family_of(best.effects[0]) if best.effects else "nothing"
+    return Result(_pooled(left), time.perf_counter() - started, says)
 
 
 def _ours(train: Sequence[Path], others: Sequence[Path], folder: Path) -> Result:

@@ -58,7 +58,10 @@ def test_nothing_is_missing_where_nothing_is_hidden() -> None:
     found = diagnose([record_of(PLAIN)], PLAIN, workers=1)
     assert found.verdict == "nothing_missing"
     assert found.steps == ()
-    assert dict(found.families) == {"none": 1.0}
+    # a small effect of any family may still hide there
+    assert found.families[0][0] == "none"
+    assert 0.5 < found.families[0][1] < 1.0
+    assert len(found.families) > 10
 
 
 def test_the_baseline_is_as_good_as_that_of_an_identification() -> None:

@@ -95,6 +95,20 @@ def test_probabilities_add_up_to_one_and_follow_the_evidence() -> None:
     assert ratio == pytest.approx(expected)
 
 
+def test_a_family_without_a_fit_is_taken_to_explain_nothing() -> None:
+    baseline = fit(PLAIN, 1.0)
+    judge = Judge(SETTINGS, baseline)
+    found = judge.probabilities([baseline, fit(DRAG, 1.0)], ["drag", "friction", "creep"])
+    assert sum(found.values()) == pytest.approx(1.0)
+    # a drag that was fitted, and explains nothing either, is as probable
+    assert found["friction"] == pytest.approx(found["creep"])
+    assert found["friction"] == pytest.approx(found["drag"])
+    assert 0.0 < found["friction"] < found["none"]
+    # where something explains decisively more, they have no weight
+    clear = judge.probabilities([fit(PLAIN, 2.0), fit(DRAG, 1.0)], ["friction"])
+    assert clear["friction"] < 1e-6
+
+
 def test_a_second_effect_must_explain_half_of_the_rest() -> None:
     baseline = fit(PLAIN, 100.0)
     judge = Judge(SETTINGS, baseline)
