@@ -162,7 +162,7 @@ class Search:
             if drifting is not None and judge.gain(baseline, drifting) > self.settings.odds:
                 return drifting
             return baseline
-        first = self._raced(baseline, pairs=True)
+        first = self._raced(baseline)
         judge.see([baseline, *first, *([drifting] if drifting else [])])
         if drifting is None or judge.gain(baseline, drifting) < self.settings.odds:
             return self._grown(baseline, first)
@@ -213,30 +213,28 @@ class Search:
         return self.keep(fit) if amplitude else None
 
     def _grown(self, best: Fit, first: list[Fit] | None) -> Fit:
-        """Return ``best`` with effects added, one by one or two at once, while that is worth it."""
+        """Return ``best`` with effects added, one by one, while that is worth it."""
         while len(best.members) < self.settings.effects_max and not self.judge.is_settled(best):
             fits, first = first or self._raced(best), None
             if not fits:
                 break
             self.judge.see([best, *fits])
-            top = fits[0]
-            worth = self.judge.is_worth(best, top)
-            self._say("grown" if worth else "not grown", best, top)
+            worth = self.judge.is_worth(best, fits[0])
+            self._say("grown" if worth else "not grown", best, fits[0])
             if not worth:
                 break
-            self.races[-1] = replace(self.races[-1], taken=top)
-            best = self._pruned(top) if len(top.members) - len(best.members) > 1 else top
-            best = self._exchanged(best)
+            self.races[-1] = replace(self.races[-1], taken=fits[0])
+            best = self._exchanged(fits[0])
         return self._pruned(best) if len(best.members) > 1 else best
 
     def _exchanged(self, best: Fit) -> Fit:
         """Return ``best`` with each effect replaced, by a race without it, where that is better."""
-        if len(best.members) < 2:
-            return best
-        for name in best.effects:
+        for name in best.effects if len(best.members) > 1 else ():
             if self.judge.is_settled(best) or name not in best.effects:
                 break
-            if name == self._at_rest:
+            # what is beside the others has just been raced for
+            raced = {race.parent.members for race in self.races}
+            if name == self._at_rest or best.members - {name} in raced:
                 continue
             fits = self._raced(self.without(best, name))
             self.judge.see([best, *fits])
@@ -284,10 +282,8 @@ class Search:
 
     # -- one race
 
-    def _raced(
-        self, parent: Fit, among: Sequence[Effect] | None = None, pairs: bool = False
-    ) -> list[Fit]:
-        """Return the fits of one more effect each, or of two, the most probable first.
+    def _raced(self, parent: Fit, among: Sequence[Effect] | None = None) -> list[Fit]:
+        """Return the fits of one more effect each, the most probable first.
 
         They are ``among`` all effects where nothing else is said.
         """
@@ -305,7 +301,7 @@ class Search:
             regression,
             [
                 Candidate(
-                    (name,),
+                    name,
                     tuple(some),
                     # the misfit does not show what it explains: the grid of springs imitates it,
                     # or the regression does not see it
@@ -317,10 +313,6 @@ class Search:
         )
         if fits and not self.judge.is_noise(fits[0]):
             fits = self._with_general(parent, regression, extent, fits)
-        if pairs and fits and not self.judge.is_noise(fits[0]):
-            both = regression.pairs(self.settings.pairs)
-            fits += self._run(parent, regression, [Candidate(s.names, (s,)) for s in both])
-            fits = self.judge.ranked(fits)
         self.races.append(
             Race(
                 parent,
@@ -342,7 +334,7 @@ class Search:
         families = {family_of(name) for fit in fits for name in fit.members - parent.members}
         laws = [e for e in self.general if e.family in families and e.name not in parent.effects]
         starts = regression.starts(laws, extent)
-        candidates = [Candidate((name,), tuple(some), True) for name, some in starts.items()]
+        candidates = [Candidate(name, tuple(some), True) for name, some in starts.items()]
         return self.judge.ranked([*fits, *self._run(parent, regression, candidates)])
 
     def _run(

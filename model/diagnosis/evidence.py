@@ -1,6 +1,6 @@
 """One criterion for every choice of a diagnosis: minus twice the logarithm of the evidence.
 
-    C = n ln(c + delta^2 (c0 - c)) + k ln n + log det(drift) + prior
+    C = n ln(c + delta^2 (c0 - c)) + k ln n + log det(drift)
 
 c is the mean square of the whitened residuals over the noise, c0 that of the baseline, k the number
 of fitted parameters. No law is true to more than delta of what it explains. n counts independent
@@ -48,12 +48,11 @@ class Evidence:
 
     misfit: float
     size: float
-    prior: float
 
     @property
     def criterion(self) -> float:
         """Minus twice the logarithm of the evidence, but for a constant."""
-        return self.misfit + self.size + self.prior
+        return self.misfit + self.size
 
 
 class Judge:
@@ -81,14 +80,9 @@ class Judge:
         s, n = self.settings, self.samples
         loss = fit.cost + s.form_error**2 * max(self.base_cost - fit.cost, 0.0)
         drift = fit.problem.noise_drift
-        unnamed = sum(
-            EFFECTS[name].family == "unknown" or not EFFECTS[name].is_reproducible
-            for name in fit.effects
-        )
         return Evidence(
             n * math.log(max(loss, 1e-12)),
             fit.free * math.log(max(n, 2.0)) + (drift.log_det if drift else 0.0),
-            s.unnamed_odds * unnamed,
         )
 
     def criterion(self, fit: Fit) -> float:

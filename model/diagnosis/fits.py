@@ -19,7 +19,6 @@ from dearig.model.diagnosis.noise import (
     pink_density,
 )
 from dearig.model.diagnosis.preparation import prepared, with_model_error, without_tails
-from dearig.model.diagnosis.regression import Values
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
@@ -397,11 +396,12 @@ class Fitter:
         recentre(problem, careful.problem, careful.problem.layout.values(careful.x))
         return problem
 
-    def start_of(self, problem: WhitenedProblem, parent: np.ndarray, effects: Values) -> np.ndarray:
-        """Return coordinates (d,) of ``problem``: a ``parent``'s, then its new ``effects``."""
+    def start_of(
+        self, problem: WhitenedProblem, parent: np.ndarray, values: Sequence[float]
+    ) -> np.ndarray:
+        """Return coordinates (d,) of ``problem``: a ``parent``'s, then the effect's ``values``."""
         layout = problem.layout
-        new = np.array([v for _, values in effects for v in values])
-        row = np.concatenate([np.zeros(parent.size), new])
+        row = np.concatenate([np.zeros(parent.size), values])
         x = np.concatenate([parent, layout.coordinates(row)[parent.size :]])
         return np.clip(x, layout.lower, layout.upper)
 
@@ -509,11 +509,6 @@ def _gain(fit: Fit, part: float = _GAIN_PART) -> float:
     Where much more than noise is left, it is a ``part`` of that.
     """
     return _GAIN if fit.cost < _POLISHED else part * fit.cost * fit.problem.samples
-
-
-def spring_count(layout: Layout) -> int:
-    """Return the number of parameters of the springs, which come first in a layout."""
-    return sum(q.kind != "effect" for q in layout.quantities)
 
 
 def fit_of(problem: WhitenedProblem, fixed: np.ndarray, found: LocalFit) -> Fit:

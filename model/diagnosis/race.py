@@ -1,9 +1,7 @@
 """The race of candidates: successive halving of output-error fits (Jamieson and Talwalkar, 2016).
 
 Each rung fits fewer candidates for more iterations. In the first ones, two starts of each candidate
-run abreast: with springs anew and with the parent's. In the last ones each candidate also starts
-beside the springs of the one that leads, and from the best law of its own family with what it has
-more neutral.
+run abreast: with springs anew and with the parent's.
 """
 
 from __future__ import annotations
@@ -16,10 +14,10 @@ import numpy as np
 
 from dearig.model import kernel
 from dearig.model.diagnosis.evidence import Judge, family_of
-from dearig.model.diagnosis.fits import Fit, Fitter, spring_count, with_effect
+from dearig.model.diagnosis.fits import Fit, Fitter, with_effect
 from dearig.model.diagnosis.regression import Start, contention
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from dearig.model.diagnosis.shapes import amplitudes, typical_values
+from dearig.model.diagnosis.shapes import typical_values
 from dearig.model.effects import EFFECTS
 
 __all__ = ["Candidate", "race"]
@@ -29,12 +27,12 @@ _TINY = 1e-3  # of the typical amplitude: an effect that hardly acts, and has a 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Effects that are added to a parent together, and the starts of their fit, best first.
+    """An effect that is added to a parent, and the starts of their fit, best first.
 
     One that is ``certain`` runs in any case.
     """
 
-    effects: tuple[str, ...]
+    effect: str
     starts: tuple[Start, ...]
     certain: bool = False
 
@@ -60,10 +58,9 @@ def race(
     for place, rung in enumerate(rungs[1:], start=1):
         judge.see(runners)
         runners = _leading(judge, runners, rung.effects, abreast=place == 1)
-        run = partial(
-            _run, fitter, runners, rung.iterations, late=place > 1, last=rung is rungs[-1]
-        )
+        run = partial(fitter.further, iterations=rung.iterations)
         runners = fitter.map(run, runners)
+    runners = fitter.map(fitter.refined, runners)
     judge.see(runners)
     return _leading(judge, runners, len(runners), abreast=False)
 
@@ -109,20 +106,19 @@ def _leading(judge: Judge, runners: Sequence[Fit], effects: int, abreast: bool) 
 
 def _entered(fitter: Fitter, parent: Fit, candidate: Candidate, iterations: int) -> list[Fit]:
     """Return first fits of a candidate: from its best start with new springs, and with old ones."""
-    model = parent.model
-    for name in candidate.effects:
-        model = with_effect(model, name, typical_values(EFFECTS[name]))
+    name = candidate.effect
+    model = with_effect(parent.model, name, typical_values(EFFECTS[name]))
     problem = fitter.problem(model, parent.drift, kernel.ROUGH)
     anew, beside = [], []
     for start in candidate.starts:
         springs = fitter.with_springs(parent, start.moduli, start.times)
-        anew.append(fitter.start_of(problem, springs, start.effects))
+        anew.append(fitter.start_of(problem, springs, start.values))
         shifted = parent.x.copy()
         if start.shift.size:
             shifted[~parent.fixed] += start.shift
         beside.append(fitter.start_of(problem, shifted, start.shifted))
     # and from nothing, in the best shape
-    nothing = tuple((name, _hardly(name, own)) for name, own in candidate.starts[0].effects)
+    nothing = _hardly(name, candidate.starts[0].values)
     beside.append(fitter.start_of(problem, parent.x, nothing))
     costs = fitter.costs(problem, np.array(anew + beside))
     chosen = (int(np.argmin(costs[: len(anew)])), len(anew) + int(np.argmin(costs[len(anew) :])))
@@ -136,63 +132,3 @@ def _hardly(name: str, values: Sequence[float]) -> tuple[float, ...]:
         v if p.neutral is None else p.neutral + _TINY * p.typical
         for p, v in zip(EFFECTS[name].parameters, values, strict=True)
     )
-
-
-def _run(
-    fitter: Fitter,
-    among: Sequence[Fit],
-    iterations: int,
-    runner: Fit,
-    late: bool,
-    last: bool,
-) -> Fit:
-    """Return a runner after one rung: the best of its own path and, if ``late``, of the others'.
-
-    ``among`` are all runners of the rung, the leader first.
-    """
-    leader = among[0]
-    fits = [fitter.further(runner, iterations)]
-    limit = fitter.settings.noise_margin**2 * min(1.0, leader.cost)
-    if late and runner is not leader and fits[0].cost > limit:
-        x = _transplanted(fitter, runner, among)
-        fits.append(fitter.descend(fits[0].problem, x, iterations))
-    best = min(fits, key=lambda f: f.cost)
-    return fitter.refined(best) if last else best
-
-
-def _transplanted(fitter: Fitter, runner: Fit, among: Sequence[Fit]) -> np.ndarray:
-    """Return coordinates (d,) of ``runner`` beside the springs of another, those of least cost.
-
-    The springs of the leader, at several amplitudes of the last effect; and the springs of better
-    fits whose last effect is of the same family, with the parameters that both have.
-    """
-    layout, leader = runner.problem.layout, among[0]
-    count = spring_count(layout)
-    effect = EFFECTS[runner.effects[-1]]
-    begin = layout.size - len(effect.parameters)
-    own = layout.values(runner.x)
-    rows = []
-    row = own.copy()
-    row[:count] = leader.problem.layout.values(leader.x)[:count]
-    rows.append(row)
-    if len(effect.amplitudes) == 1:
-        for amplitude in amplitudes(effect.amplitudes[0], fitter.settings.amplitudes):
-            rows.append(row.copy())
-            rows[-1][begin] = amplitude
-    for other in among:
-        law = EFFECTS[other.effects[-1]]
-        if other is runner or other.cost >= runner.cost or law.family != effect.family:
-            continue
-        theirs = other.problem.layout.values(other.x)
-        known = {
-            (p.name, p.unit): v
-            for p, v in zip(law.parameters, theirs[-len(law.parameters) :], strict=True)
-        }
-        row = own.copy()
-        row[:count] = theirs[:count]
-        for i, p in enumerate(effect.parameters):
-            old = row[begin + i] if p.neutral is None else p.neutral
-            row[begin + i] = known.get((p.name, p.unit), old)
-        rows.append(row)
-    inside = np.array([np.clip(layout.coordinates(r), layout.lower, layout.upper) for r in rows])
-    return inside[int(np.argmin(runner.problem.costs(inside)))]

@@ -3,12 +3,12 @@
 With the stretch imposed, the misfit of a model with effects e is linear in the moduli mu of springs
 on a grid of relaxation times and in the coefficients a of effects' responses:
 
-    minimise |P mu - Y - D a|   over  mu >= 0, mu_0 near the parent's, a within its bounds.
+    minimise |P mu - Y - D a|   over  mu >= 0, a within its bounds.
 
 P, Y and D are of ``dearig.model.diagnosis.imposed``, in units of the noise. The column of mu_0 is
 the whole derivative of the misfit, the rest stretch lam0(mu_0) included. One QR decomposition of P
-serves all effects; each point of an effect's shape parameters, and each pair of effects, is then a
-small non-negative least squares problem.
+serves all effects; each point of an effect's shape parameters is then a small non-negative least
+squares problem.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from dearig.model.diagnosis.least_squares import bounded, lagrange, well_determi
 from dearig.model.diagnosis.noise import Drift, DriftSpace, drift_modes
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import Extent, amplitudes, moved, shape_points, typical_values
-from dearig.model.effects import EFFECTS, PLACES, Effect
+from dearig.model.effects import PLACES, Effect
 from dearig.model.film import Strip, unit_stresses
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
@@ -50,30 +50,21 @@ _POLISHING = 5  # Gauss-Newton steps of relaxation times between the nodes of th
 _WEAK = 1e-3  # of the largest modulus: a branch without weight still needs influence to move
 
 
-#: Effects with the values of their parameters.
-Values = tuple[tuple[str, tuple[float, ...]], ...]
-
-
 @dataclass(frozen=True)
 class Start:
-    """Where a fit begins: new effects with their values, and springs, in two ways.
+    """Where a fit begins: the numbers of an effect, and springs, in two ways.
 
-    With springs anew, of ``moduli`` (1 + n,) in Pa and ``times`` (n,) in s, the effects are as in
-    ``effects``. With the parent's, moved by ``shift`` (f,) in the parent's free coordinates, they
-    are as in ``shifted``. ``misfit`` is the RMS, in noises of a mean, that the regression leaves.
+    With springs anew, of ``moduli`` (1 + n,) in Pa and ``times`` (n,) in s, they are ``values``.
+    With the parent's, moved by ``shift`` (f,) in the parent's free coordinates, they are
+    ``shifted``. ``misfit`` is the RMS, in noises of a mean, that the regression leaves.
     """
 
-    effects: Values
+    values: tuple[float, ...]
     moduli: np.ndarray
     times: np.ndarray
     misfit: float
-    shifted: Values
+    shifted: tuple[float, ...]
     shift: np.ndarray
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the effects that it adds."""
-        return tuple(name for name, _ in self.effects)
 
 
 @dataclass(frozen=True)
@@ -103,13 +94,12 @@ _Row = tuple[float, np.ndarray, _Columns]  # misfit, coefficients, columns
 def contention(misfit: float, best: float, settings: DiagnosisSettings) -> float:
     """Return the misfit up to which an effect may come to lead: ``best`` is the least of all.
 
-    What leaves several times as much will not lead, and what explains less than a part of what the
-    best one explains of the ``misfit`` without an effect will not either. The regression errs by
-    about one noise itself: it contains derivatives of a reading.
+    What explains less than a share of what the best one explains of the ``misfit`` without an
+    effect will not. The regression errs by about one noise itself: it contains derivatives of a
+    reading.
     """
     explained = misfit**2 - best**2
-    part = math.sqrt(max(misfit**2 - settings.share * explained, 0.0) + 1.0)
-    return min(settings.contenders * max(best, 1.0), part)
+    return math.sqrt(max(misfit**2 - settings.share * explained, 0.0) + 1.0)
 
 
 def electric(name: str) -> bool:
@@ -153,7 +143,6 @@ class Regression:
         self._displacements = _clean(records, model, settings, went)
         self._records = tuple(records)
         self._linear: dict[str, bool] = {}
-        self._best: dict[str, list[_Row]] = {}
         self._imposed = self._impose(model)
         self._whiten = self._drift(drift) if drift else None
         self.columns = self._joined([i.columns for i in self._imposed])
@@ -230,11 +219,9 @@ class Regression:
         there = self._misfit_of(moved, self._impose(moved))
         here = self._misfit_of(self.model, self._imposed)
         self.columns[0] = (there - here) / (_REST_STEP * modulus)
-        self._least = (1.0 - self.settings.modulus_freedom) * modulus
         # about the parent's mu_0, at which the target was computed
         network_part = modulus * self._joined([i.columns[0] for i in self._imposed])
-        self._wanted = self.target - network_part
-        self._wanted = self._wanted + (modulus - self._least) * self.columns[0]
+        self._wanted = self.target - network_part + modulus * self.columns[0]
 
     def _misfit_of(
         self, model: Actuator | Strip, imposed: Sequence[ImposedActuator | ImposedStrip]
@@ -272,15 +259,13 @@ class Regression:
     def _rms(self, norm: float) -> float:
         return norm / math.sqrt(self.target.size)
 
-    def _solve(self, columns: Sequence[_Columns] | None) -> tuple[np.ndarray, float]:
+    def _solve(self, columns: _Columns | None) -> tuple[np.ndarray, float]:
         """Return coefficients within their limits, and the norm of the misfit."""
-        if not columns:
+        if columns is None:
             _, left = nnls(self._triangle, self._inside)
             return np.zeros(0), math.hypot(left, float(np.linalg.norm(self._outside)))
-        inside = np.hstack([c.inside for c in columns])
-        outside = np.hstack([c.outside for c in columns])
-        low, high = np.hstack([c.limits for c in columns])
-        return bounded(self._triangle, self._inside, self._outside, inside, outside, low, high)
+        c = columns
+        return bounded(self._triangle, self._inside, self._outside, c.inside, c.outside, *c.limits)
 
     def _columns_of(
         self, effect: Effect, shape: tuple[float, ...], probes: tuple[float, ...]
@@ -314,8 +299,8 @@ class Regression:
         columns = self._columns_of(effect, shape, probes)
         if columns is None:
             return None
-        a, left = self._solve([columns])
-        return self._weighed(left, a, [columns]), a, columns
+        a, left = self._solve(columns)
+        return self._weighed(left, a, columns), a, columns
 
     def _sharpened(self, row: _Row, extent: Extent) -> _Row:
         """Return ``row`` after a pattern search of the effect's shape parameters.
@@ -367,20 +352,16 @@ class Regression:
     def _response(self, effect: Effect, values: tuple[float, ...]) -> np.ndarray:
         return self._joined([i.response(effect.name, values) for i in self._imposed])
 
-    def _weighed(self, misfit: float, coefficients: np.ndarray, used: Sequence[_Columns]) -> float:
-        """Return the RMS of the misfit; where effects act on the pull, over what is left of it.
+    def _weighed(self, misfit: float, coefficients: np.ndarray, columns: _Columns) -> float:
+        """Return the RMS of the misfit; where the effect acts on the pull, over what is left of it.
 
         Else "no pull at all" would fit best.
         """
-        pull = self.target.copy()
-        first = 0
-        for c in used:
-            k = c.rows.shape[0]
-            if electric(c.effect.name):
-                pull += coefficients[first : first + k] @ c.rows
-            first += k
+        if not electric(columns.effect.name):
+            return self._rms(misfit)
         whole = float(np.linalg.norm(self.target))
-        return self._rms(misfit) * whole / max(float(np.linalg.norm(pull)), 1e-9 * whole)
+        pull = float(np.linalg.norm(self.target + coefficients @ columns.rows))
+        return self._rms(misfit) * whole / max(pull, 1e-9 * whole)
 
     # -- starts
 
@@ -410,75 +391,31 @@ class Regression:
                 )
                 least = min(least, some[0][0])
             best[name] = some
-        self._best |= best
         found = {
-            name: [self._start([(c, a)], left) for left, a, c in some]
-            for name, some in best.items()
+            name: [self._start(c, a, left) for left, a, c in some] for name, some in best.items()
         }
         return found | {e.name: [self._unseen(e)] for e in effects if is_unseen(e)}
 
     def _unseen(self, effect: Effect) -> Start:
         """Return a start beside the parent's springs of an effect that has no column."""
         network = self.model.network
-        values = ((effect.name, typical_values(effect)),)
+        values = typical_values(effect)
         moduli = np.array([spring.modulus for spring in network.springs])
         times = np.array([branch.relaxation_time for branch in network.branches])
         return Start(values, moduli, times, self.misfit, values, np.zeros(0))
 
-    def pairs(self, many: int) -> list[Start]:
-        """Return the ``many`` best starts of two effects of different families, best first.
+    def _start(self, columns: _Columns, coefficients: np.ndarray, misfit: float) -> Start:
+        moduli, times = self._branches(self._wanted + coefficients @ columns.rows)
+        shifted, shift = self._shifted(columns)
+        return Start(columns.values(coefficients), moduli, times, misfit, shifted, shift)
 
-        ``starts`` must have been called. Two effects explain a share of what the best one leaves;
-        else a race beside that one finds the second. Of two families together at most three pairs,
-        and none of general laws: two forms can be had in too many ways.
-        """
-        ranked = []
-        least = min((some[0][0] for some in self._best.values()), default=self.misfit)
-        most = math.sqrt(1.0 + (1.0 - self.settings.share) * max(least**2 - 1.0, 0.0))
-        named = [name for name in self._best if not EFFECTS[name].is_general]
-        for m, n in combinations(named, 2):
-            if EFFECTS[m].family != EFFECTS[n].family:
-                (_, _, c), (_, _, d) = self._best[m][0], self._best[n][0]
-                a, left = self._solve([c, d])
-                misfit = self._weighed(left, a, [c, d])
-                if misfit < most:
-                    ranked.append((misfit, m, n))
-        ranked.sort()
-        taken: dict[frozenset[str], int] = {}
-        found: list[Start] = []
-        for _, m, n in ranked:
-            families = frozenset((EFFECTS[m].family, EFFECTS[n].family))
-            if taken.get(families, 0) == 3 or len(found) == many:
-                continue
-            taken[families] = taken.get(families, 0) + 1
-            tried = [
-                (self._weighed(left, a, [c, d]), a, c, d)
-                for _, _, c in self._best[m]
-                for _, _, d in self._best[n]
-                for a, left in (self._solve([c, d]),)
-            ]
-            left, a, c, d = min(tried, key=lambda row: row[0])
-            k = c.rows.shape[0]
-            found.append(self._start([(c, a[:k]), (d, a[k:])], left))
-        return sorted(found, key=lambda s: s.misfit)
-
-    def _start(self, used: Sequence[tuple[_Columns, np.ndarray]], misfit: float) -> Start:
-        wanted = self._wanted.copy()
-        for c, a in used:
-            wanted += a @ c.rows
-        moduli, times = self._branches(wanted)
-        effects = tuple((c.effect.name, c.values(a)) for c, a in used)
-        shifted, shift = self._shifted([c for c, _ in used])
-        return Start(effects, moduli, times, misfit, shifted, shift)
-
-    def _shifted(self, used: Sequence[_Columns]) -> tuple[Values, np.ndarray]:
-        """Return effects, and the step (f,) of the parent's free coordinates that goes with them.
+    def _shifted(self, columns: _Columns) -> tuple[tuple[float, ...], np.ndarray]:
+        """Return an effect, and the step (f,) of the parent's free coordinates that goes with it.
 
         A Gauss-Newton step along the directions that the records determine well: the others are
-        not straight so far. Without a derivative the effects are neutral, and nothing moves.
+        not straight so far. Without a derivative the effect is neutral, and nothing moves.
         """
-        rows = np.vstack([c.rows for c in used])
-        low, high = np.hstack([c.limits for c in used])
+        rows, (low, high) = columns.rows, columns.limits
         if not self._residuals.size:
             a, step = np.zeros(low.size), np.zeros(0)
         else:
@@ -487,12 +424,7 @@ class Regression:
             left = self._residuals - u @ (u.T @ self._residuals)
             a = lsq_linear(beyond.T, -left, (low, high)).x
             step = -inverse @ (u.T @ (self._residuals + a @ rows))
-        firsts = np.cumsum([0, *(c.rows.shape[0] for c in used)])
-        found = tuple(
-            (c.effect.name, c.values(a[i:j]))
-            for c, (i, j) in zip(used, pairwise(firsts), strict=True)
-        )
-        return found, step
+        return columns.values(a), step
 
     def _branches(self, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return moduli (1 + n,) and times (n,) of the best set of branches that explain (M,)."""

@@ -17,11 +17,12 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import json
 import math
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -31,7 +32,6 @@ from scipy.stats import binomtest
 
 from dearig.config.rigfile import RigFile
 from dearig.model.actuator import Actuator
-from dearig.model.diagnosis import race as racing
 from dearig.model.diagnosis.conclusion import Conclusion
 from dearig.model.diagnosis.engine import Search
 from dearig.model.diagnosis.evidence import Judge, family_of
@@ -67,7 +67,6 @@ def _without(owner: Any, name: str, instead: Callable[..., Any]) -> Switch:
 VARIANTS = (
     Variant("whole", {}),
     # stages
-    Variant("no pairs in the race", {"pairs": 0}),
     Variant(
         "no general laws",
         {},
@@ -79,19 +78,11 @@ VARIANTS = (
     Variant(
         "shapes not sharpened", {}, _without(Regression, "_sharpened", lambda *given: given[1])
     ),
-    Variant(
-        "no start from other laws",
-        {},
-        _without(racing, "_transplanted", lambda *given: given[1].x),
-    ),
     Variant("one effect at most", {"effects_max": 1}),
     # rules
     Variant("one start of each effect", {"starts": 1}),
-    Variant("all effects race", {"contenders": math.inf}),
     Variant("no model of the form's error", {"form_error": 0.0, "form_share": 0.0}),
     Variant("a further effect need not explain half", {"share": 0.0}),
-    Variant("mu_0 free in the regression", {"modulus_freedom": 1.0}),
-    Variant("unnamed causes as probable", {"unnamed_odds": 0.0}),
     Variant("noise is noise, white or not", {}, _without(Judge, "_is_like_rest", lambda *_: True)),
 )
 
@@ -121,7 +112,7 @@ class Shared:
         self._baseline = self._fitter.baseline(lambda *_: None)
         self._spent = self._fitter.work.effort
         self._kept: dict[Any, tuple[Any, int, float]] = {}
-        for name in ("descend", "refined", "careful", "costs"):
+        for name in ("descend", "refined", "careful", "identified", "costs"):
             setattr(self._fitter, name, self._once(name, getattr(self._fitter, name)))
         self._fitter.baseline = lambda _: self._baseline  # type: ignore[method-assign]
 
@@ -179,7 +170,7 @@ class Shared:
 
 #: Settings that the regression does not use.
 _NOT_OF_REGRESSION = (
-    "effort", "pairs", "effects_max", "odds", "unnamed_odds", "form_error", "form_share",
+    "effort", "effects_max", "odds", "form_error", "form_share",
     "noise_margin", "white_correlation", "tempering",
 )  # fmt: skip
 
@@ -207,11 +198,15 @@ def main() -> None:
     parser.add_argument("--noise", choices=NOISES, default=WHITE, help="[white]")
     parser.add_argument("--rate", type=float, default=200.0, help="Hz [200]")
     parser.add_argument("--only", help="names of variants beside the whole, with commas between")
+    parser.add_argument("--effort", type=float, help="integration steps of a search [its own]")
+    parser.add_argument("--keep", type=Path, help="append a line of JSON for each rig to this file")
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.rigs)
     if given.seeds:
         seeds = [int(seed) for seed in given.seeds.split(",")]
     variants = list(VARIANTS)
+    if given.effort:
+        variants = [replace(v, settings={"effort": given.effort, **v.settings}) for v in variants]
     if given.only:
         names = ["whole", *(name.strip() for name in given.only.split(","))]
         if unknown := set(names) - {v.name for v in VARIANTS}:
@@ -222,22 +217,31 @@ def main() -> None:
         bench = Bench(Path(folder), given.rate)
         for seed in seeds:
             case = Case(seed, "thesis", given.hand, given.noise)
-            for name, outcome in _played(bench, case, Path(folder) / str(seed), variants):
+            outcomes, kept = _played(bench, case, Path(folder) / str(seed), variants)
+            for name, outcome in outcomes.items():
                 found[name].append(outcome)
+            if given.keep:
+                with given.keep.open("a", encoding="utf-8") as lines:
+                    lines.write(json.dumps(kept) + "\n")
             print(f"{seed}: {_told(found)}", flush=True)
     print(_table(found))
 
 
 def _played(
     bench: Bench, case: Case, folder: Path, variants: list[Variant]
-) -> Iterator[tuple[str, Outcome]]:
-    """Record the rig of ``case``, and diagnose it by every variant."""
+) -> tuple[dict[str, Outcome], dict[str, Any]]:
+    """Record the rig of ``case`` and diagnose it by every variant.
+
+    With the outcomes is returned what the probabilities of the whole method are made of.
+    """
     folder.mkdir()
     train, others = (records_of(paths) for paths in bench.record(case, folder))
     least = math.hypot(bench.floor_um(case.noise), bench.own_um(case)) * 1e-6
     rig = RigFile()
     shared = Shared(train, Actuator(rig.as_film(), rig.as_load(), TABLE_3))
     families = set(case.truth.families)
+    outcomes: dict[str, Outcome] = {}
+    kept: dict[str, Any] = {}
     for variant in variants:
         end, effort = shared.diagnosed(variant)
         order = end.order()
@@ -246,7 +250,40 @@ def _played(
         before, after = (
             _error(model, others) / least for model in models if isinstance(model, Actuator)
         )
-        yield variant.name, Outcome(right, before, after, effort)
+        outcomes[variant.name] = Outcome(right, before, after, effort)
+        kept = kept or _kept(case, end)
+    kept["outcomes"] = {name: asdict(outcome) for name, outcome in outcomes.items()}
+    return outcomes, kept
+
+
+def _kept(case: Case, end: Conclusion) -> dict[str, Any]:
+    """Return what the probabilities of the families are made of, for their calibration."""
+    judge, found = end.judge, end.found
+    return {
+        "seed": case.seed,
+        "hand": case.hand,
+        "noise": case.noise,
+        "hidden": list(case.truth.families),
+        "status": found.status,
+        "verdict": end.verdict(),
+        "explained": end.explained,
+        "small": end.is_small,
+        "first_cost": end.first.cost,
+        "last_cost": end.last.cost,
+        "samples": judge.samples,
+        "base_cost": judge.base_cost,
+        "sought": sorted(found.sought),
+        "best": sorted(found.best.members),
+        "fits": [
+            {
+                "members": sorted(fit.members),
+                "cost": fit.cost,
+                "free": fit.free,
+                "criterion": judge.criterion(fit),
+            }
+            for fit in found.fits.values()
+        ],
+    }
 
 
 def _error(model: Actuator, records: list[ActuatorRecord]) -> float:

@@ -24,7 +24,10 @@ __all__ = [
 CLEAN_FROM, FAMILY_FROM = 1000, 2000
 
 #: Seeds whose cases were looked at to mend the diagnosis by evidence: figures come from others.
-LOOKED_AT = range(60000, 60064)
+LOOKED_AT = frozenset(
+    (*range(60000, 60064), *range(160000, 160034), *range(161000, 161008))
+    + (*range(170000, 170033), *range(171000, 171012), *range(180000, 180010), 181000)
+)
 
 _RIG = RigFile()
 

@@ -359,14 +359,15 @@ def test_masked_readings_do_not_influence_a_diagnosis():
     assert {s.effect for s in found.steps} == {"sensor curvature", "mains interference"}
     assert found.final.cost == pytest.approx(1.0, abs=0.1)
     assert found.after[0].is_noise
-    assert all(one.candidates[0].promised > 0.4 for one in found.rounds if one.chosen)
+    kept = {s.effect for s in found.steps}
+    assert all(one.candidates[0].promised > 0.4 for one in found.rounds if one.chosen in kept)
 
 
 def test_an_interrupted_search_returns_what_it_has_found():
     record = record_of(plant("load inertia"))
     asked = []
 
-    for many in (60, 600):
+    for many in (60, 200):
         asked.clear()
 
         def stop(many=many):

@@ -76,34 +76,23 @@ def test_an_amplitude_is_found_from_the_model_without_it(
 ) -> None:
     record = replace(silent(replace(PLAIN, effects=effect(name, **hidden))), noise=NOISE)
     start = starts(record, PLAIN, name)[name][0]
-    assert start.effects[0][1] == pytest.approx(tuple(hidden.values()), rel=0.15)
+    assert start.values == pytest.approx(tuple(hidden.values()), rel=0.15)
 
 
 def test_a_shape_between_the_points_of_the_grid_is_found() -> None:
     hidden = effect("amplifier saturation", loss=0.1, exponent=7.1)
     record = replace(silent(replace(PLAIN, effects=hidden)), noise=NOISE)
-    (_, (loss, exponent)), *_ = starts(record, PLAIN, "amplifier saturation")[
-        "amplifier saturation"
-    ][0].effects
+    found = starts(record, PLAIN, "amplifier saturation")["amplifier saturation"]
+    loss, exponent = found[0].values
     assert loss == pytest.approx(0.1, rel=0.5)
     assert exponent == pytest.approx(7.1, rel=0.15)
-
-
-def test_the_true_pair_leads_the_pairs() -> None:
-    hidden = (*effect("linear drag", drag=900.0), *effect("sensor curvature", quadratic=15.0))
-    record = replace(silent(replace(PLAIN, effects=hidden)), noise=NOISE)
-    found = regression(record, PLAIN)
-    extent = extent_of([record], lambda low, high: 0.5 * (low + high))
-    names = ["linear drag", "sensor curvature", "amplifier offset", "leakage"]
-    found.starts([EFFECTS[n] for n in names], extent)
-    assert set(found.pairs(4)[0].names) == {"linear drag", "sensor curvature"}
 
 
 def test_a_film_driven_by_stretch_is_regressed_alike() -> None:
     hidden = effect("Mullins softening", softening=0.1, width=0.4)
     record = film_record_of(replace(STRIP, effects=hidden), noise=1.0)
     start = starts(record, STRIP, "Mullins softening", "linear drag")["Mullins softening"][0]
-    assert start.effects[0][1] == pytest.approx((0.1, 0.4), rel=0.3)
+    assert start.values == pytest.approx((0.1, 0.4), rel=0.3)
 
 
 def test_bounded_least_squares_agree_with_scipys() -> None:
