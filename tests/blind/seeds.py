@@ -25,9 +25,13 @@ CLEAN_FROM, FAMILY_FROM = 1000, 2000
 
 #: Seeds whose cases were looked at to mend the diagnosis by evidence: figures come from others.
 LOOKED_AT = frozenset(
-    (*range(60000, 60064), *range(160000, 160034), *range(161000, 161008))
-    + (*range(170000, 170033), *range(171000, 171012), *range(180000, 180010), 181000)
-)
+    seed
+    for first, last in (
+        (60000, 60063), (160000, 160033), (161000, 161007), (170000, 170032), (171000, 171011),
+        (180000, 180009), (181000, 181000),
+    )
+    for seed in range(first, last + 1)
+)  # fmt: skip
 
 _RIG = RigFile()
 
