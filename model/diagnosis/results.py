@@ -209,8 +209,7 @@ class Diagnosis:
     linear between samples, but the data show that it is held until the next. ``notes`` are
     sentences for the operator. ``status`` is ``complete``, ``stopped`` (by the operator) or
     ``budget`` (the search took the work that it may). ``families`` are the probabilities of the
-    families, of ``none`` and of ``unknown``, largest first, which add up to 1; they are not
-    calibrated yet.
+    families, of ``none`` and of ``unknown``, largest first, which add up to 1.
     """
 
     verdict: str
