@@ -31,7 +31,7 @@ class ActuatorRecord:
 
     ``noise`` is the standard deviation of one reading in m. ``lag`` is the known time in s by which
     a reading is older than its time stamp (an averaging sensor), less the converter's skew: the
-    model is evaluated at ``time - lag``; by ``lag_error`` it may be more or less. ``valid`` (N,)
+    model is evaluated at ``time - lag``; it is known within ``lag_error``. ``valid`` (N,)
     bool is False where a reading must not be used (a dropout, a clipped sensor), None where all are
     good. Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it
     is counted from there. Each reading is the mean of ``means_of`` that were taken, evenly about

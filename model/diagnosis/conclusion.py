@@ -10,6 +10,7 @@ from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.engine import MUCH_LESS, Found, Race
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
+from dearig.model.diagnosis.imposed import lateness
 from dearig.model.diagnosis.residual import signatures
 from dearig.model.diagnosis.results import (
     Candidate,
@@ -311,10 +312,26 @@ def _notes(
             "the voltage is held between samples, as by a converter, although the records declare "
             "it linear: half a sample of delay, not an effect of the rig"
         )
+    said += _own_delays(end)
     if end.is_small and not all(getattr(s, "is_noise", True) for s in after):
         said.append(
             "the residual is not quite white noise, but too small to attribute to an effect"
         )
+    return said
+
+
+def _own_delays(end: Conclusion) -> list[str]:
+    """Return a sentence on each lag that is no longer than the sensor's delay is uncertain."""
+    model, said = end.last.model, []
+    known = max(getattr(record, "lag_error", 0.0) for record in end.fitter.full)
+    for name in end.found.best.effects:
+        if isinstance(model, Actuator) and EFFECTS[name].family == "sensor_lag":
+            late = lateness(model, name)
+            if abs(late) <= known:
+                said.append(
+                    f"{name}: the reading is late by {late * 1e3:.3g} ms, and the delay of the "
+                    f"sensor is known within {known * 1e3:.3g} ms only: it may be the sensor's own"
+                )
     return said
 
 

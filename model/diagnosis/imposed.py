@@ -42,12 +42,20 @@ from dearig.model.material import Branch, Network
 from dearig.model.network import HEAD
 from dearig.model.records import ActuatorRecord, FilmRecord
 
-__all__ = ["ImposedActuator", "ImposedStrip", "is_sensor", "springs_of_grid", "without_sensor"]
+__all__ = [
+    "ImposedActuator",
+    "ImposedStrip",
+    "is_sensor",
+    "lateness",
+    "springs_of_grid",
+    "without_sensor",
+]
 
 _WIDE_LIMIT = 1e4  # J of a spring that does not stiffen within any stretch of an actuator
 _DAMPING = 0.05  # of critical, of the film as an oscillator: it only keeps G finite at its peak
 _INVERSIONS = 3  # of a sensor effect; each leaves its square, relative to the motion
 _NOTHING = np.zeros(0)
+_STEADY = 1e-4  # m/s: a motion by which the delay of a reading shows
 
 
 def is_sensor(name: str) -> bool:
@@ -67,6 +75,14 @@ def springs_of_grid(model: Actuator | Strip, grid: np.ndarray) -> Network:
         first, last = (replace(s, limit=_WIDE_LIMIT) for s in (first, last))
     branch = replace(last, modulus=1.0)
     return Network(replace(first, modulus=1.0), tuple(Branch(branch, float(t)) for t in grid))
+
+
+def lateness(model: Actuator, name: str) -> float:
+    """Return by how many s the sensor effect ``name`` makes the reading of a steady motion late."""
+    time = np.linspace(0.0, 1.0, 1001)
+    moved = _STEADY * time
+    read = _sensed(_only(model.coefficients(), name), time, moved, float(time[1]))
+    return float(moved[-1] - read[-1]) / _STEADY
 
 
 def without_sensor(record: ActuatorRecord, model: Actuator, smoothing: float) -> np.ndarray:

@@ -29,7 +29,7 @@ class Score:
     step says that it cannot tell it from what is hidden), ``wrong``, or ``failed``. ``both`` is
     None but for two effects. ``needless`` are families named that are not hidden. ``floor`` is the
     rig's noise, ``own`` what the validation recordings have each of their own: the way a bench has
-    wandered, which the hidden truth itself could not foretell. ``probability`` is what the
+    wandered, which the hidden truth itself could not predict. ``probability`` is what the
     diagnosis gives to what is true, ``brier`` the Brier score; ``processor`` are seconds of
     processors that the command took; all NaN where they are not known.
     """

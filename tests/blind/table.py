@@ -102,7 +102,7 @@ def _totals(mode: str, scores: Sequence[Score]) -> str:
         _share("named right or in the group", covered, lambda s: s.found, NAMED[mode]),
         _share("within 15 % of the noise", covered, lambda s: s.is_noise, EXPLAINED),
         _share(
-            "... of what hides no walk",
+            "... of what hides no drift that changes from run to run",
             [s for s in covered if not s.own],
             lambda s: s.is_noise,
             None,
@@ -119,8 +119,8 @@ def _totals(mode: str, scores: Sequence[Score]) -> str:
     if floors:
         said = (
             f"\n\nThe rig's noise is {scores[0].floor:.3f} um; the diagnoses read "
-            f"{min(floors):.2f} to {max(floors):.2f} times that. A walk that "
-            "is another in each run counts as noise: not even the hidden truth foretells it."
+            f"{min(floors):.2f} to {max(floors):.2f} times that. A drift that "
+            "changes from run to run counts as noise: not even the hidden truth predicts it."
         )
     return _TARGETS + "\n".join(row for row in rows if row) + said + _sureness(scores)
 

@@ -187,13 +187,13 @@ def test_the_totals_are_held_against_what_is_wanted() -> None:
 
 
 def test_what_is_of_one_run_alone_is_nobodys_error() -> None:
-    walked = score(result(("drift",), step("drift"), after=11.0, own=10.0))
-    assert walked.is_noise
+    drifting = score(result(("drift",), step("drift"), after=11.0, own=10.0))
+    assert drifting.is_noise
     assert not score(result(("drift",), step("drift"), after=12.5, own=10.0)).is_noise
     assert not score(result(("drift",), step("drift"), after=11.0)).is_noise
-    page = report([walked, score(result(("drag",), step("drag"), after=2.0))])
+    page = report([drifting, score(result(("drag",), step("drag"), after=2.0))])
     assert "| within 15 % of the noise | 1 of 2 (50%)" in page
-    assert "| ... of what hides no walk | 0 of 1 (0%) |" in page
+    assert "| ... of what hides no drift that changes from run to run | 0 of 1 (0%) |" in page
 
 
 def test_one_false_alarm_in_fifty_is_allowed() -> None:

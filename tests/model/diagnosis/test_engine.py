@@ -163,6 +163,16 @@ def test_a_fit_in_which_the_work_ended_is_made_again(monkeypatch) -> None:
     assert search.without(fit, "sensor curvature").effects == ()
 
 
+def test_a_lag_that_may_be_the_sensors_own_is_said_to() -> None:
+    late = record_of(replace(PLAIN, effects=effect("sensor delay", delay=4e-3)))
+    found = diagnose([replace(late, lag_error=5e-3)], PLAIN, workers=1)
+    assert [step.family for step in found.steps] == ["sensor_lag"]
+    (said,) = (note for note in found.notes if "sensor's own" in note)
+    assert "late by 4" in said or "late by 3.9" in said
+    known = diagnose([replace(late, lag_error=1e-3)], PLAIN, workers=1)
+    assert not any("sensor's own" in note for note in known.notes)
+
+
 def after_rest(way: np.ndarray) -> ActuatorRecord:
     """The plain film after 4 s at 0 V, its reading off by ``way`` (N,) m."""
     drive = thesis_drive()
