@@ -367,7 +367,10 @@ def _outcome(
         for stage in models
     )
     found = models[-1].predicting
-    own = {r.name: _own(r, found, drive) for r in (*recordings, *others)}
+    # that the reading drifts is for the training recordings to show: alone in another one, what is
+    # slow may be a law that they do not show
+    drifts = any(step.family == "drift" for step in finding.steps)
+    own = {r.name: _own(r, found, drive, drifts) for r in (*recordings, *others)}
     stands = tuple(
         _without_own(stand, own) if stage.predicting == found else stand
         for stand, stage in zip(stands, models, strict=True)
@@ -447,12 +450,12 @@ def _compared(
     return tuple(found)
 
 
-def _own(recording: Recording, model: Any, drive: str) -> Own | None:
+def _own(recording: Recording, model: Any, drive: str, may_drift: bool) -> Own | None:
     """Return the events and the drift of ``recording``; None without any, and of films."""
     record = as_record(recording, drive)
     if not (isinstance(record, ActuatorRecord) and isinstance(model, Actuator)):
         return None
-    return own_of(record, model)
+    return own_of(record, model, may_drift=may_drift)
 
 
 def _without_own(stand: Stand, own: dict[str, Own | None]) -> Stand:

@@ -49,9 +49,14 @@ class Own:
 
 
 def own_of(
-    record: ActuatorRecord, model: Actuator, settings: DiagnosisSettings | None = None
+    record: ActuatorRecord,
+    model: Actuator,
+    settings: DiagnosisSettings | None = None,
+    may_drift: bool = True,
 ) -> Own | None:
     """Return the events and the drift of ``record`` beside ``model``; None without any.
+
+    Unless it ``may_drift``, what is slow is no drift: a law that the model lacks is as slow.
 
     They are accepted only if the remaining error is noise, or a fiftieth of what they explain: an
     event imitates part of any law that the model lacks. What explains as much from the start on is
@@ -64,11 +69,12 @@ def own_of(
     judge = Judge(fitter.settings, plain)
     if judge.is_noise(plain):
         return None
-    drift = fitter.space().most_probable(plain.plain_residuals())
     ways = [_with_events(fitter, judge, plain)]
-    later = fitter.space().most_probable(ways[0].plain_residuals())
-    redrifted = _as_it_is(fitter.problem(ways[0].model, later))
-    ways.append(replace(redrifted, fixed=ways[0].fixed))
+    if may_drift:
+        later = fitter.space().most_probable(ways[0].plain_residuals())
+        redrifted = _as_it_is(fitter.problem(ways[0].model, later))
+        ways.append(replace(redrifted, fixed=ways[0].fixed))
+    drift = fitter.space().most_probable(plain.plain_residuals()) if may_drift else 0.0
     if drift:
         ways.append(_with_events(fitter, judge, _as_it_is(fitter.problem(model, drift))))
     judge.see(ways)

@@ -52,6 +52,14 @@ def test_a_drift_of_the_reading_is_no_event() -> None:
     assert own.rms < 1.1 * NOISE
 
 
+def test_what_is_slow_is_no_drift_where_no_reading_is_known_to_drift() -> None:
+    record = record_of(PLAIN)
+    time = record.time
+    drifting = replace(record, displacement=record.displacement + 2e-5 * np.sqrt(time / time[-1]))
+    assert own_of(drifting, PLAIN) is not None
+    assert own_of(drifting, PLAIN, may_drift=False) is None
+
+
 def test_a_law_that_the_model_lacks_is_not_taken_off_as_events() -> None:
     truth = replace(PLAIN, effects=effect("sensor curvature", quadratic=15.0))
     record = record_of(truth)
