@@ -21,7 +21,13 @@ EFFECT = Effect(
         Parameter("second_sine", "m", (-1e-3, 1e-3), "of the second harmonic", 1e-6, 0.0),
         # slower, a swinging load is told from it by its decay only
         Parameter(
-            "frequency", "Hz", (8.0, 500.0), "of the fundamental", 0.02, relative_to="spectrum"
+            "frequency",
+            "Hz",
+            (8.0, 500.0),
+            "of the fundamental",
+            0.02,
+            starts=(25.0,),  # a motor of 1500/min
+            relative_to="spectrum",
         ),
     ),
 )
