@@ -38,9 +38,9 @@ class Judgement:
     """A verdict, and the reasons for which it is less than what the search found.
 
     ``reasons`` are of: ``training`` (the error of a training recording is above its noise),
-    ``selection`` (the cross-validation error rises), ``validation`` (the error of a validation
-    recording is above its noise) and ``stopped`` (nothing is missing so far, but not everything was
-    tried).
+    ``selection`` (the cross-validation error rises with what was added), ``validation`` (the error
+    of a validation recording is above its noise) and ``stopped`` (nothing is missing so far, but
+    not everything was tried).
     """
 
     verdict: str
@@ -67,7 +67,7 @@ def judge(
     before, after = selection
     doubts = {
         "training": any(error > TOLERANCE for error in training),
-        "selection": after > before and after > TOLERANCE,
+        "selection": found == EXPLAINED and after > before and after > TOLERANCE,
         "validation": any(error > TOLERANCE for error in validation),
         "stopped": found == NOTHING_MISSING and status == STOPPED,
     }

@@ -6,6 +6,7 @@ itself, the validation recordings too, while the model stays as it is, and taken
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,7 +41,8 @@ class Event:
 class Own:
     """What is a recording's own: its ``events``, and whether its reading ``drifts``.
 
-    ``rms`` is the model's error in m without them.
+    ``rms`` is the model's error in m without them, and without the slow part of a noise that is
+    coloured: over a whole recording it is larger than at rest.
     """
 
     events: tuple[Event, ...]
@@ -54,7 +56,7 @@ def own_of(
     settings: DiagnosisSettings | None = None,
     may_drift: bool = True,
 ) -> Own | None:
-    """Return the events and the drift of ``record`` beside ``model``; None without any.
+    """Return the events and the drift of ``record`` beside ``model``; None in white noise alone.
 
     Unless it ``may_drift``, what is slow is no drift: a law that the model lacks is as slow.
 
@@ -67,8 +69,11 @@ def own_of(
     fitter.read_colour()
     plain = _as_it_is(fitter.problem(model))
     judge = Judge(fitter.settings, plain)
+    nothing = None
+    if plain.problem.noise_drift is not None:
+        nothing = Own((), False, fitter.full[0].noise * math.sqrt(plain.cost))
     if judge.is_noise(plain):
-        return None
+        return nothing
     ways = [_with_events(fitter, judge, plain)]
     if may_drift:
         later = fitter.space().most_probable(ways[0].plain_residuals())
@@ -83,7 +88,7 @@ def own_of(
     left = max(best.cost - 1.0, 0.0) / max(plain.cost - best.cost, 1e-12)
     believed = judge.is_noise(best) or left < fitter.settings.form_share
     if not believed or not (added or best.drift):
-        return None
+        return nothing
     numbers = dict(best.model.effects)
     events = []
     for name in added:

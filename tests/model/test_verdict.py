@@ -44,7 +44,9 @@ def test_effects_that_raise_the_cross_validation_error_explain_nothing_for_sure(
     told = judge(EXPLAINED, COMPLETE, [1.0], [], (4.4, 72.0))
     assert told == Judgement(PARTLY_EXPLAINED, ("selection",))
     # at the noise a small rise means nothing
-    assert judge(NOTHING_MISSING, COMPLETE, [1.0], [], (1.04, 1.05)).verdict == NOTHING_MISSING
+    assert judge(EXPLAINED, COMPLETE, [1.0], [], (1.04, 1.05)).verdict == EXPLAINED
+    # where nothing was added, nothing rises: both are of one fit
+    assert judge(NOTHING_MISSING, COMPLETE, [1.0], [], (1.20, 1.21)).verdict == NOTHING_MISSING
 
 
 @pytest.mark.parametrize("validation", [[], [1.0], [3.0]])

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dearig.model.actuator import Drive
 from dearig.model.diagnosis.events import own_of
-from tests.tools.engine import NOISE, PLAIN, effect, record_of
+from dearig.model.noise import noise_at_rest
+from tests.tools.engine import NOISE, PLAIN, effect, pink_noise, record_of, thesis_drive
 
 KINDS = {
     "sudden change of force": {"stress": 60.0, "moment": 6.3},
@@ -58,6 +60,24 @@ def test_what_is_slow_is_no_drift_where_no_reading_is_known_to_drift() -> None:
     drifting = replace(record, displacement=record.displacement + 2e-5 * np.sqrt(time / time[-1]))
     assert own_of(drifting, PLAIN) is not None
     assert own_of(drifting, PLAIN, may_drift=False) is None
+
+
+def test_the_slow_part_of_coloured_noise_is_no_error_of_the_model() -> None:
+    # at rest for 4 s, then 20 s more: 1/f noise goes farther in all of them
+    drive = thesis_drive()
+    time = np.arange(400 + drive.time.size) / 100.0
+    voltage = np.concatenate((np.zeros(400), drive.voltage))
+    plain = record_of(PLAIN, Drive(time, voltage, hold=True))
+    pink = pink_noise(np.random.default_rng(8), time.size, 1.5e-13)
+    reading = plain.displacement + pink - pink[:400].mean()
+    noise = noise_at_rest(time[:400], reading[:400])
+    record = replace(plain, displacement=reading, noise=noise, lead_in=400)
+    own = own_of(record, PLAIN, may_drift=False)
+    assert own is not None
+    assert (own.events, own.drifts) == ((), False)
+    error = reading - record.seen(PLAIN.simulate(record.drive).displacement)
+    assert own.rms < 0.9 * float(np.sqrt(np.mean(error**2)))
+    assert own.rms < 1.15 * noise
 
 
 def test_a_law_that_the_model_lacks_is_not_taken_off_as_events() -> None:
