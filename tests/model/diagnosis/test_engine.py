@@ -11,6 +11,7 @@ import pytest
 from dearig.model.actuator import Drive
 from dearig.model.diagnosis import diagnose, engine
 from dearig.model.diagnosis.fits import Fitter
+from dearig.model.diagnosis.preparation import has_line_at_rest
 from dearig.model.diagnosis.race import race
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
@@ -198,6 +199,20 @@ def test_a_bench_that_vibrates_is_told_by_its_line() -> None:
     found = diagnose([after_rest(3e-6 * np.sin(turn) + 1e-6 * np.cos(2.0 * turn))], PLAIN)
     assert [step.effect for step in found.steps] == ["vibration"]
     assert found.verdict == "explained"
+
+
+def test_what_the_readings_at_rest_show_is_fitted_first() -> None:
+    time = np.arange(400 + thesis_drive().time.size) / 100.0
+    hums = after_rest(2e-5 * np.sin(2.0 * np.pi * 23.7 * time))
+    assert has_line_at_rest(hums)
+    assert not has_line_at_rest(after_rest(np.zeros(time.size)))
+    curved = plant("sensor curvature")
+    bent = curved.simulate(hums.drive).displacement - PLAIN.simulate(hums.drive).displacement
+    found = diagnose([replace(hums, displacement=hums.displacement + bent)], PLAIN)
+    assert {step.effect for step in found.steps} == {"sensor curvature", "vibration"}
+    first = found.rounds[0]
+    assert {candidate.family for candidate in first.candidates} == {"interference"}
+    assert first.chosen == "vibration"
 
 
 def test_slow_noise_of_a_sensor_is_noise_and_a_drift_is_a_drift() -> None:
