@@ -388,9 +388,9 @@ class Tracking:
     def _other_tried(self) -> tuple[str, ...]:
         """Go on from the compared model's run where learning has ended above the noise.
 
-        What the model has and the film has not, a sharp resonance for example, stands in the way of
-        what runs could teach. Where both end above it, the better voltage is kept. What is said is
-        returned.
+        A model with a sharp resonance that the film does not have gives voltages that ring, and
+        learning does not correct that. If both end above the noise, the better voltage is kept.
+        Returns the notes for the report.
         """
         now, theirs = (self._learner, self._followed), self._compare
         if not self._learner.settled or self._learner.is_at_noise or theirs is None:

@@ -182,7 +182,7 @@ class Search:
     def _humming(self, baseline: Fit) -> Fit:
         """Return ``baseline`` with interference where the readings at rest have a line.
 
-        What is there without a voltage is no answer of the film, and stands before all that is.
+        It is there without a voltage, so the film does not cause it. It is fitted first.
         """
         laws = [e for e in self.effects if e.family == "interference"]
         if not laws or not any(map(has_line_at_rest, self.fitter.full)):
@@ -232,7 +232,7 @@ class Search:
         for name in best.effects if len(best.members) > 1 else ():
             if self.judge.is_settled(best) or name not in best.effects:
                 break
-            # what is beside the others has just been raced for
+            # a race from this parent was run already, and would give the same
             raced = {race.parent.members for race in self.races}
             if name == self._at_rest or best.members - {name} in raced:
                 continue

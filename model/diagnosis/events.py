@@ -58,7 +58,7 @@ def own_of(
 ) -> Own | None:
     """Return the events and the drift of ``record`` beside ``model``; None in white noise alone.
 
-    Unless it ``may_drift``, what is slow is no drift: a law that the model lacks is as slow.
+    With ``may_drift`` False a slow error is not taken for drift: a missing law can be as slow.
 
     They are accepted only if the remaining error is noise, or a fiftieth of what they explain: an
     event imitates part of any law that the model lacks. What explains as much from the start on is

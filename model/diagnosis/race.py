@@ -70,8 +70,8 @@ def _contending(
 ) -> list[Candidate]:
     """Return the candidates of which the regression leaves open whether they may lead.
 
-    Their misfit is near the least, and they explain the better part of what the best explains. As
-    many as enter the last rung but one run in any case.
+    They explain at least the share of the settings of what the best explains. As many as enter the
+    last rung but one run in any case.
     """
     ranked = sorted(candidates, key=lambda c: c.misfit)
     if not ranked:

@@ -167,7 +167,7 @@ def _flat_bic(
         if "voltage" in effect.drives and not effect.needs:
             values = typical_values(effect)
             problem = fitter.problem(with_effect(baseline.model, name, values))
-            start = fitter.start_of(problem, baseline.x, ((name, values),))
+            start = fitter.start_of(problem, baseline.x, values)
             fits.append(fitter.descend(problem, start, FLAT_ITERATIONS))
     n = baseline.problem.samples
     best = min(fits, key=lambda f: n * math.log(f.cost) + f.free * math.log(n))
