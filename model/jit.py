@@ -43,7 +43,7 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 _KERNEL_ROOT = Path(__file__).parent
-_WITHOUT_KERNELS = ("control", "diagnosis", "fitting")  # folders that compile nothing
+_WITHOUT_KERNELS = ("control", "diagnosis", "fitting", "residual")  # folders that compile nothing
 # numba fills this module from the environment when it is imported: a type checker finds it empty
 _settings: dict[str, Any] = vars(numba.config)
 

@@ -17,6 +17,7 @@ from dearig.model.errors import ModelError
 __all__ = [
     "DIFFERENCES",
     "LEAD_IN",
+    "NOISE_MARGIN",
     "READINGS_MIN",
     "Tails",
     "about_rest",
@@ -28,6 +29,9 @@ __all__ = [
 
 #: Sources of a noise: readings at rest, or second differences of all of them.
 LEAD_IN, DIFFERENCES = "lead-in", "second differences"
+#: RMS over noise up to which a residual counts as noise. A lead-in of 2 s at 200 Hz gives the noise
+#: to 1/sqrt(2 * 400) = 3.5 %; this is 2.3 of these.
+NOISE_MARGIN = 1.08
 #: Fewer readings have no second difference to average.
 READINGS_MIN = 4
 _READINGS_A_LINE = 4  # samples for each of the three numbers of a periodic line

@@ -10,7 +10,7 @@ import numpy as np
 from dearig.model.actuator import Drive
 from dearig.model.errors import ModelError
 
-__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted"]
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "bridged", "counted"]
 
 _MATCHING = 10  # iterations; each leaves a third of the error of the one before
 
@@ -215,6 +215,13 @@ class FilmRecord:
 
 
 Record = ActuatorRecord | FilmRecord
+
+
+def bridged(record: Record, values: np.ndarray) -> np.ndarray:
+    """Return ``values`` (N,) at the samples of ``record``, interpolated across masked readings."""
+    if record.valid is None or not record.valid.any():
+        return values
+    return np.interp(record.time, record.time[record.valid], values[record.valid])
 
 
 def _check(name: str, values: np.ndarray, time: np.ndarray, noise: float) -> None:

@@ -370,7 +370,7 @@ def _outcome(
     # that the reading drifts is for the training recordings to show: alone in another one, what is
     # slow may be a law that they do not show
     drifts = any(step.family == "drift" for step in finding.steps)
-    own = {r.name: _own(r, found, drive, drifts) for r in (*recordings, *others)}
+    own = _own((*recordings, *others), found, drive, drifts)
     stands = tuple(
         _without_own(stand, own) if stage.predicting == found else stand
         for stand, stage in zip(stands, models, strict=True)
@@ -450,12 +450,20 @@ def _compared(
     return tuple(found)
 
 
-def _own(recording: Recording, model: Any, drive: str, may_drift: bool) -> Own | None:
-    """Return the events and the drift of ``recording``; None without any, and of films."""
-    record = as_record(recording, drive)
-    if not (isinstance(record, ActuatorRecord) and isinstance(model, Actuator)):
-        return None
-    return own_of(record, model, may_drift=may_drift)
+def _own(
+    recordings: Sequence[Recording], model: Any, drive: str, may_drift: bool
+) -> dict[str, Own | None]:
+    """Return the events and the drift of each of ``recordings``; None without any, and of films."""
+    records = {r.name: as_record(r, drive) for r in recordings}
+
+    def of(name: str) -> Own | None:
+        record = records[name]
+        if not (isinstance(record, ActuatorRecord) and isinstance(model, Actuator)):
+            return None
+        others = [r for other, r in records.items() if other != name]
+        return own_of(record, model, may_drift=may_drift, others=others)
+
+    return {name: of(name) for name in records}
 
 
 def _without_own(stand: Stand, own: dict[str, Own | None]) -> Stand:

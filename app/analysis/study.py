@@ -23,7 +23,7 @@ from dearig.analysis.outcomes import (
 from dearig.analysis.residual import even, spectrum
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
-from dearig.model.diagnosis.results import Dependence, MissingStress, Signature
+from dearig.model.residual import Dependence, MissingStress, Signature
 from dearig.progress import Progress, quiet
 from dearig.recording.reader import open_recording
 from dearig.recording.result_folder import numbered_folder

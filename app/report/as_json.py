@@ -27,9 +27,10 @@ if TYPE_CHECKING:
         Stand,
         ValidateOutcome,
     )
-    from dearig.model.diagnosis.results import Candidate, Signature, Stage, Step
+    from dearig.model.diagnosis.results import Candidate, Stage, Step
     from dearig.model.effects import Curve
     from dearig.model.fitting import Estimate
+    from dearig.model.residual import Signature
 
 __all__ = ["diagnosis_json", "outcome_json"]
 

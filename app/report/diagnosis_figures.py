@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dearig.analysis.outcomes import Comparison
-    from dearig.model.diagnosis.results import Dependence, MissingStress, Signature
     from dearig.model.effects import Curve
+    from dearig.model.residual import Dependence, MissingStress, Signature
 
 __all__ = [
     "bars_figure",

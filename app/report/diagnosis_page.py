@@ -37,7 +37,7 @@ from dearig.units import SHOWN, readable
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
-    from dearig.model.diagnosis.results import MissingStress, Signature
+    from dearig.model.residual import MissingStress, Signature
 
 __all__ = ["write_diagnosis_report"]
 

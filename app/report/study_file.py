@@ -14,8 +14,8 @@ import numpy as np
 from dearig.analysis.outcomes import Comparison
 from dearig.analysis.study import Residual, Study, Task, Trace, study
 from dearig.errors import InputError
-from dearig.model.diagnosis.results import Dependence, MissingStress
 from dearig.model.measures import Errors
+from dearig.model.residual import Dependence, MissingStress
 from dearig.progress import Progress, quiet
 from dearig.recording.files import in_words, replaced_when_done
 from dearig.recording.json_file import write_json

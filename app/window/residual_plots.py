@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from dearig.analysis.study import Residual
-from dearig.model.diagnosis.results import Dependence, MissingStress
+from dearig.model.residual import Dependence, MissingStress
 from dearig.units import SHOWN, readable
 from dearig.window.plot_area import PlotArea
 from dearig.window.plot_item import Entry

@@ -11,7 +11,6 @@ from dearig.model.diagnosis.engine import MUCH_LESS, Found, Race
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
 from dearig.model.diagnosis.imposed import lateness
-from dearig.model.diagnosis.residual import signatures
 from dearig.model.diagnosis.results import (
     Candidate,
     Diagnosis,
@@ -20,10 +19,17 @@ from dearig.model.diagnosis.results import (
     Step,
 )
 from dearig.model.diagnosis.stages import DRIFT_LAW, stage_of
-from dearig.model.diagnosis.stress import missing_stress
-from dearig.model.diagnosis.symbolic_regression import describe_unnamed
 from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
+from dearig.model.residual import (
+    MissingStress,
+    Signature,
+    Unnamed,
+    describe_unnamed,
+    looks,
+    missing_stress,
+    signatures,
+)
 from dearig.model.verdict import (
     EXPLAINED,
     NOTHING_MISSING,
@@ -32,7 +38,7 @@ from dearig.model.verdict import (
     UNEXPLAINED,
 )
 
-__all__ = ["Conclusion", "conclude"]
+__all__ = ["Conclusion", "conclude", "unnamed_of"]
 
 _ITERATIONS = 8  # of the last fits, on every sample
 _NAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
@@ -240,7 +246,7 @@ def conclude(
     unnamed = None
     open_end = verdict in (UNEXPLAINED, PARTLY_EXPLAINED) and found.status != "stopped"
     if open_end or any(s.family == "unknown" for s in steps):
-        unnamed = describe_unnamed(missing_after, after, steps)
+        unnamed = unnamed_of(steps, missing_after, after)
     return Diagnosis(
         verdict=verdict,
         baseline=first,
@@ -260,6 +266,22 @@ def conclude(
         status=found.status,
         families=_families(end),
     )
+
+
+def unnamed_of(
+    steps: Sequence[Step], missing: Sequence[MissingStress], after: Sequence[Signature]
+) -> Unnamed | None:
+    """Return a description of what no family explains: an effect of ``unknown`` is its own."""
+    own = [s for s in steps if s.family == "unknown"]
+    if not own:
+        return describe_unnamed(missing, after)
+    numbers = "; ".join(f"{s.effect} ({_values(s)})" for s in own)
+    words = "; ".join(EFFECTS[s.effect].summary for s in own)
+    return Unnamed(own[0].acts_on, numbers, f"{words}. Residual: {looks(after)}")
+
+
+def _values(step: Step) -> str:
+    return ", ".join(f"{e.name} = {e.value:.4g} {e.unit}".strip() for e in step.estimates)
 
 
 def _label(member: str) -> str:

@@ -7,6 +7,7 @@ itself, the validation recordings too, while the model stays as it is, and taken
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +16,12 @@ from dearig.model import kernel
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit, Fitter, fit_of, with_effect
-from dearig.model.diagnosis.noise import WhitenedProblem
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import typical_values
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting.broyden import descend_broyden
-from dearig.model.records import ActuatorRecord
+from dearig.model.fitting.slow_noise import WhitenedProblem
+from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["Event", "Own", "own_of"]
 
@@ -55,10 +56,13 @@ def own_of(
     model: Actuator,
     settings: DiagnosisSettings | None = None,
     may_drift: bool = True,
+    others: Sequence[Record] = (),
 ) -> Own | None:
     """Return the events and the drift of ``record`` beside ``model``; None in white noise alone.
 
-    With ``may_drift`` False a slow error is not taken for drift: a missing law can be as slow.
+    With ``may_drift`` False a slow error is not taken for drift: a missing law can be as slow. The
+    readings at rest of ``others``, recordings with the same sensor, tell the colour of its noise
+    better than a single lead-in.
 
     They are accepted only if the remaining error is noise, or a fiftieth of what they explain: an
     event imitates part of any law that the model lacks. What explains as much from the start on is
@@ -66,7 +70,7 @@ def own_of(
     so of two events of one kind the larger is found.
     """
     fitter = Fitter([record], replace(model, effects=()), settings or DiagnosisSettings(), 1)
-    fitter.read_colour()
+    fitter.read_colour(others)
     plain = _as_it_is(fitter.problem(model))
     judge = Judge(fitter.settings, plain)
     nothing = None

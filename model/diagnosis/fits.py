@@ -12,12 +12,6 @@ import numpy as np
 
 from dearig.model import kernel
 from dearig.model.actuator import Actuator
-from dearig.model.diagnosis.noise import (
-    DriftSpace,
-    WhitenedProblem,
-    drift_basis,
-    pink_density,
-)
 from dearig.model.diagnosis.preparation import prepared, with_model_error, without_tails
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
@@ -31,6 +25,12 @@ from dearig.model.fitting.levenberg import LocalFit, descend
 from dearig.model.fitting.parallel import Job, Result, parallel_map
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.search import voltage_starts
+from dearig.model.fitting.slow_noise import (
+    DriftSpace,
+    WhitenedProblem,
+    drift_basis,
+    pink_density,
+)
 from dearig.model.records import ActuatorRecord, Record, counted
 
 __all__ = ["DRIFT", "Fit", "Fitter", "Work", "fit_of", "with_effect"]
@@ -257,9 +257,12 @@ class Fitter:
             found.append(without_tails(record, -problem.residuals(x) * record.noise))
         return tuple(found)
 
-    def read_colour(self) -> None:
-        """Read the 1/f noise of the records at rest; the noise of later problems has it."""
-        self._pink_density = pink_density(self.records, self.settings.odds)
+    def read_colour(self, others: Sequence[Record] = ()) -> None:
+        """Read the 1/f noise of the records at rest; the noise of later problems has it.
+
+        It is of the sensor: the readings at rest of ``others`` tell it as well.
+        """
+        self._pink_density = pink_density((*self.records, *others), self.settings.odds)
         self._space.clear()
 
     def _pink(self, records: Sequence[ActuatorRecord], modes: int) -> list[np.ndarray] | None:

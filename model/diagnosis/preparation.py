@@ -12,11 +12,10 @@ from dearig.model.film import Strip
 from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.thinning import thinned
 from dearig.model.noise import about_rest, noise_at_rest, tails_of
-from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
+from dearig.model.records import ActuatorRecord, FilmRecord, Record, bridged, counted
 
 __all__ = [
     "FILM_MODEL_ERROR",
-    "bridged",
     "has_line_at_rest",
     "prepared",
     "with_model_error",
@@ -43,13 +42,6 @@ def prepared(record: Record, model: Actuator | Strip) -> Record:
     if isinstance(thin, FilmRecord):
         return thin
     return replace(thin, displacement=bridged(thin, thin.displacement))
-
-
-def bridged(record: Record, values: np.ndarray) -> np.ndarray:
-    """Return ``values`` (N,) at the samples of ``record``, interpolated across masked readings."""
-    if record.valid is None or not record.valid.any():
-        return values
-    return np.interp(record.time, record.time[record.valid], values[record.valid])
 
 
 def _thinned(record: Record, model: Actuator | Strip) -> Record:

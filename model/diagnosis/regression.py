@@ -29,11 +29,11 @@ from dearig.model.diagnosis.imposed import (
     without_sensor,
 )
 from dearig.model.diagnosis.least_squares import bounded, lagrange, well_determined
-from dearig.model.diagnosis.noise import Drift, DriftSpace, drift_modes
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import Extent, amplitudes, moved, shape_points, typical_values
 from dearig.model.effects import PLACES, Effect
 from dearig.model.film import Strip, unit_stresses
+from dearig.model.fitting.slow_noise import Drift, DriftSpace, drift_modes
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = ["Regression", "Start", "contention", "electric"]

@@ -13,84 +13,15 @@ from dearig.model.actuator import Actuator
 from dearig.model.effects import EFFECTS, Curve
 from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
+from dearig.model.residual import MissingStress, Signature, Unnamed
 
 __all__ = [
     "Candidate",
-    "Dependence",
     "Diagnosis",
-    "MissingStress",
     "Round",
-    "Signature",
     "Stage",
     "Step",
-    "Unnamed",
 ]
-
-
-@dataclass(frozen=True)
-class Dependence:
-    """How the residual depends on one quantity: bin centres ``at`` (B,) and bin means.
-
-    ``loading`` and ``unloading`` (B,) are the means of the residual where the quantity rises and
-    where it falls (NaN where a bin is empty); ``error`` (B,) is the standard error of the bin mean
-    if the residual were noise. ``explained`` is the share of the residual's variance that a
-    function of this quantity alone explains, 0 to 1, beyond what noise would give.
-    """
-
-    quantity: str
-    unit: str
-    at: np.ndarray
-    loading: np.ndarray
-    unloading: np.ndarray
-    error: np.ndarray
-    explained: float
-
-
-@dataclass(frozen=True)
-class Signature:
-    """Description of the residual of one record.
-
-    ``time``, ``residual`` (N,): measured less model, in the measured unit. ``noise`` is the floor
-    of one of these samples. ``ljung_box_p`` and ``runs_p`` are the probabilities that noise alone
-    is as correlated, and changes its sign as rarely. ``frequency`` Hz and ``density`` (F,)
-    are its power spectral density (unit^2/Hz), ``floor_density`` that of the noise. ``words`` are
-    sentences on what is remarkable.
-    """
-
-    record: str
-    time: np.ndarray
-    residual: np.ndarray
-    noise: float
-    rms: float
-    ljung_box_p: float
-    runs_p: float
-    correlation_time: float
-    frequency: np.ndarray
-    density: np.ndarray
-    floor_density: float
-    dependences: tuple[Dependence, ...]
-    loading_less_unloading: float
-    first_less_repeats: float
-    is_noise: bool
-    words: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class MissingStress:
-    """Stress in Pa that the model lacks, sample by sample (N,), and what it may depend on.
-
-    ``band`` is the upper frequency in Hz to which it was kept; ``scale`` the RMS of the Maxwell
-    stress (or of the measured stress of a film) to compare it with. ``voltage`` is zero for films.
-    """
-
-    record: str
-    time: np.ndarray
-    stress: np.ndarray
-    stretch: np.ndarray
-    rate: np.ndarray
-    voltage: np.ndarray
-    band: float
-    scale: float
 
 
 @dataclass(frozen=True)
@@ -188,15 +119,6 @@ class Step:
         """Return the form that a general law has found; None for a law with a name."""
         draw = EFFECTS[self.effect].curve
         return draw({e.name: e.value for e in self.estimates}) if draw else None
-
-
-@dataclass(frozen=True)
-class Unnamed:
-    """A residual that no effect explains: where it acts, a formula if found, and a description."""
-
-    acts_on: str
-    expression: str
-    signature: str
 
 
 @dataclass(frozen=True)

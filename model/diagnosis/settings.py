@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dearig.model.noise import NOISE_MARGIN
+
 __all__ = ["DiagnosisSettings", "Rung"]
 
 
@@ -66,8 +68,7 @@ class DiagnosisSettings:
         Part of what is above the noise that a further effect must explain: the wrong form of the
         first one leaves structure that any other effect explains to some part.
     noise_margin
-        RMS over noise up to which a residual counts as noise. A lead-in of 2 s at 200 Hz gives the
-        noise to 1/sqrt(2 * 400) = 3.5 %; this is 2.3 of these.
+        RMS over noise up to which a residual counts as noise.
     white_correlation
         Correlation time up to which a residual counts as white, in samples, or in the correlation
         time of the reading at rest where that is not white.
@@ -95,7 +96,7 @@ class DiagnosisSettings:
     form_error: float = 0.01
     form_share: float = 0.02
     share: float = 0.5
-    noise_margin: float = 1.08
+    noise_margin: float = NOISE_MARGIN
     white_correlation: float = 1.3
     drift_modes: int = 24
     tempering: float = 3.0

@@ -12,13 +12,13 @@ import numpy as np
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit
-from dearig.model.diagnosis.noise import WhitenedProblem
 from dearig.model.diagnosis.results import Stage
 from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 from dearig.model.fitting.estimates import estimates_with_intervals
 from dearig.model.fitting.left_out import left_out
+from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["DRIFT_LAW", "drift_values", "stage_of", "with_drift"]

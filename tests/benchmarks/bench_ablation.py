@@ -36,11 +36,11 @@ from dearig.model.diagnosis.conclusion import Conclusion
 from dearig.model.diagnosis.engine import Search
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import Fit, Fitter
-from dearig.model.diagnosis.noise import WhitenedProblem
 from dearig.model.diagnosis.regression import Regression
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import Extent
 from dearig.model.effects import Effect
+from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.material import TABLE_3
 from dearig.model.records import ActuatorRecord
 from dearig.sim_backend.laser_noise import NOISES, WHITE

@@ -11,19 +11,16 @@ from dearig.config.modelfile import ModelFile
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.results import (
     Candidate,
-    Dependence,
     Diagnosis,
-    MissingStress,
     Round,
-    Signature,
     Stage,
     Step,
-    Unnamed,
 )
 from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.measures import errors
+from dearig.model.residual import Dependence, MissingStress, Signature, Unnamed
 from tests.tools.reports import ESTIMATES, NOISE, actuator_comparison, film_comparison
 
 LAG = (("sensor lag", (("time_constant", 9.5e-3),)),)

@@ -11,12 +11,12 @@ import numpy as np
 from dearig.model import kernel
 from dearig.model.actuator import Actuator, Drive
 from dearig.model.diagnosis.fits import Fit
-from dearig.model.diagnosis.noise import WhitenedProblem
 from dearig.model.effects import EFFECTS, EffectValues
 from dearig.model.excitation import Sequence
 from dearig.model.film import Strip
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
+from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
 

@@ -10,6 +10,7 @@ import pytest
 from dearig.model.actuator import Drive
 from dearig.model.diagnosis.events import own_of
 from dearig.model.noise import noise_at_rest
+from dearig.model.records import ActuatorRecord
 from tests.tools.engine import NOISE, PLAIN, effect, pink_noise, record_of, thesis_drive
 
 KINDS = {
@@ -62,22 +63,41 @@ def test_what_is_slow_is_no_drift_where_no_reading_is_known_to_drift() -> None:
     assert own_of(drifting, PLAIN, may_drift=False) is None
 
 
-def test_the_slow_part_of_coloured_noise_is_no_error_of_the_model() -> None:
-    # at rest for 4 s, then 20 s more: 1/f noise goes farther in all of them
+def record_in_pink_noise(seed: int, lead_in: int = 400) -> ActuatorRecord:
+    """At rest for 4 s, of which the first readings are told to be at rest, then 20 s more."""
     drive = thesis_drive()
     time = np.arange(400 + drive.time.size) / 100.0
     voltage = np.concatenate((np.zeros(400), drive.voltage))
     plain = record_of(PLAIN, Drive(time, voltage, hold=True))
-    pink = pink_noise(np.random.default_rng(8), time.size, 1.5e-13)
-    reading = plain.displacement + pink - pink[:400].mean()
-    noise = noise_at_rest(time[:400], reading[:400])
-    record = replace(plain, displacement=reading, noise=noise, lead_in=400)
+    pink = pink_noise(np.random.default_rng(seed), time.size, 1.5e-13)
+    reading = plain.displacement + pink - pink[:lead_in].mean()
+    noise = noise_at_rest(time[:lead_in], reading[:lead_in])
+    return replace(plain, displacement=reading, noise=noise, lead_in=lead_in)
+
+
+def error_of(record: ActuatorRecord) -> float:
+    error = record.displacement - record.seen(PLAIN.simulate(record.drive).displacement)
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def test_the_slow_part_of_coloured_noise_is_no_error_of_the_model() -> None:
+    # 1/f noise goes farther in the whole recording than at rest
+    record = record_in_pink_noise(8)
     own = own_of(record, PLAIN, may_drift=False)
     assert own is not None
     assert (own.events, own.drifts) == ((), False)
-    error = reading - record.seen(PLAIN.simulate(record.drive).displacement)
-    assert own.rms < 0.9 * float(np.sqrt(np.mean(error**2)))
-    assert own.rms < 1.15 * noise
+    assert own.rms < 0.9 * error_of(record)
+    assert own.rms < 1.15 * record.noise
+
+
+def test_the_colour_of_noise_is_that_of_all_recordings_at_rest() -> None:
+    record = record_in_pink_noise(8, lead_in=120)
+    assert own_of(record, PLAIN, may_drift=False) is None  # too few readings to tell
+    others = [record_in_pink_noise(seed) for seed in (1, 2, 3)]
+    own = own_of(record, PLAIN, may_drift=False, others=others)
+    assert own is not None
+    assert (own.events, own.drifts) == ((), False)
+    assert own.rms < 0.9 * error_of(record)
 
 
 def test_a_law_that_the_model_lacks_is_not_taken_off_as_events() -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.fits import Fit
-from dearig.model.diagnosis.noise import Drift, DriftSpace, WhitenedProblem, drift_basis
 from dearig.model.diagnosis.stages import with_drift
 from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.slow_noise import Drift, DriftSpace, WhitenedProblem, drift_basis
 from tests.tools.engine import NOISE, PLAIN, record_of
 
 

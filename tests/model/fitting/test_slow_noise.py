@@ -8,14 +8,14 @@ from scipy.linalg import sqrtm
 from scipy.stats import multivariate_normal
 
 from dearig.model.actuator import Drive
-from dearig.model.diagnosis.noise import (
+from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.slow_noise import (
     Drift,
     DriftSpace,
     WhitenedProblem,
     drift_modes,
     pink_density,
 )
-from dearig.model.fitting.parameters import Layout
 from dearig.model.records import ActuatorRecord
 from tests.tools.engine import PLAIN, masked, pink_noise, record_of, thesis_drive
 

@@ -4,24 +4,72 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from scipy.signal import welch
 from scipy.stats import chi2, norm
 
-from dearig.model.diagnosis.results import Dependence, Signature
-from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.fitting.intervals import correlation_time, unevenness
+from dearig.model.noise import NOISE_MARGIN
 from dearig.model.records import ActuatorRecord, Record
 
-__all__ = ["signatures"]
+__all__ = ["Dependence", "Signature", "signatures"]
 
 _BY_CHANCE = 1e-3  # significance level of the test for a white spectrum
 _LAGS = 20  # of the Ljung-Box test
 _BINS = 24
 _SHARE = 0.03  # of the residual's variance beyond chance: below, there is no dependence
 _REPORTED_SHARE = 0.1  # the same, for a sentence
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How the residual depends on one quantity: bin centres ``at`` (B,) and bin means.
+
+    ``loading`` and ``unloading`` (B,) are the means of the residual where the quantity rises and
+    where it falls (NaN where a bin is empty); ``error`` (B,) is the standard error of the bin mean
+    if the residual were noise. ``explained`` is the share of the residual's variance that a
+    function of this quantity alone explains, 0 to 1, beyond what noise would give.
+    """
+
+    quantity: str
+    unit: str
+    at: np.ndarray
+    loading: np.ndarray
+    unloading: np.ndarray
+    error: np.ndarray
+    explained: float
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Description of the residual of one record.
+
+    ``time``, ``residual`` (N,): measured less model, in the measured unit. ``noise`` is the floor
+    of one of these samples. ``ljung_box_p`` and ``runs_p`` are the probabilities that noise alone
+    is as correlated, and changes its sign as rarely. ``frequency`` Hz and ``density`` (F,)
+    are its power spectral density (unit^2/Hz), ``floor_density`` that of the noise. ``words`` are
+    sentences on what is remarkable.
+    """
+
+    record: str
+    time: np.ndarray
+    residual: np.ndarray
+    noise: float
+    rms: float
+    ljung_box_p: float
+    runs_p: float
+    correlation_time: float
+    frequency: np.ndarray
+    density: np.ndarray
+    floor_density: float
+    dependences: tuple[Dependence, ...]
+    loading_less_unloading: float
+    first_less_repeats: float
+    is_noise: bool
+    words: tuple[str, ...]
 
 
 class _Scaled(Protocol):
@@ -76,7 +124,7 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     sensed = isinstance(record, ActuatorRecord)
     uneven = unevenness(used, _BY_CHANCE) if sensed else 0.0
     is_independent = all(d.explained < _SHARE for d in dependences)
-    is_noise = rms < DiagnosisSettings.noise_margin * noise and is_independent and uneven == 0.0
+    is_noise = rms < NOISE_MARGIN * noise and is_independent and uneven == 0.0
     return Signature(
         record=record.name,
         time=time,

@@ -10,24 +10,41 @@ the sensor appear as a stress, so every reported error comes from simulation.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from dearig.model.actuator import Actuator, at_rest
 from dearig.model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
-from dearig.model.diagnosis.preparation import bridged
-from dearig.model.diagnosis.results import MissingStress
 from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, assembly
 from dearig.model.film import Strip, unit_stresses
 from dearig.model.fitting.search import SMOOTHING
 from dearig.model.kinematics import thinning
 from dearig.model.network import HEAD
-from dearig.model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.records import ActuatorRecord, FilmRecord, Record, bridged
 
-__all__ = ["missing_stress"]
+__all__ = ["MissingStress", "missing_stress"]
 
 _BAND = 10.0  # Hz
+
+
+@dataclass(frozen=True)
+class MissingStress:
+    """Stress in Pa that the model lacks, sample by sample (N,), and what it may depend on.
+
+    ``band`` is the upper frequency in Hz to which it was kept; ``scale`` the RMS of the Maxwell
+    stress (or of the measured stress of a film) to compare it with. ``voltage`` is zero for films.
+    """
+
+    record: str
+    time: np.ndarray
+    stress: np.ndarray
+    stretch: np.ndarray
+    rate: np.ndarray
+    voltage: np.ndarray
+    band: float
+    scale: float
 
 
 def missing_stress(records: Sequence[Record], model: Actuator | Strip) -> tuple[MissingStress, ...]:

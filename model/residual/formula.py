@@ -8,13 +8,14 @@ and counts only if it explains the other part too.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.model.diagnosis.results import MissingStress, Signature, Step, Unnamed
-from dearig.model.effects import EFFECTS
+from dearig.model.residual.missing_stress import MissingStress
+from dearig.model.residual.signature import Signature
 
-__all__ = ["describe_unnamed"]
+__all__ = ["Unnamed", "describe_unnamed", "looks"]
 
 _TERMS_MAX = 3
 _TERM_SHARE_MIN = 0.05  # of the variance in the part left out: what each term must explain
@@ -23,36 +24,37 @@ _BLOCKS = 8  # of time, every other one left out
 _DELAYS = (0.05, 0.2, 1.0)  # s
 
 
-def describe_unnamed(
-    missing: Sequence[MissingStress], after: Sequence[Signature], steps: Sequence[Step]
-) -> Unnamed | None:
-    """Return a description of the residual that no family explains; None without records.
+@dataclass(frozen=True)
+class Unnamed:
+    """A residual that no effect explains: where it acts, a formula if found, and a description."""
 
-    An effect of the family ``unknown`` in the model is described by its own formula.
-    """
-    own = [s for s in steps if s.family == "unknown"]
-    look = "; ".join(f"{s.record}: {', '.join(s.words)}" for s in after)
-    if own:
-        numbers = "; ".join(f"{s.effect} ({_values(s)})" for s in own)
-        words = "; ".join(EFFECTS[s.effect].summary for s in own)
-        return Unnamed(own[0].acts_on, numbers, f"{words}. Residual: {look}")
+    acts_on: str
+    expression: str
+    signature: str
+
+
+def describe_unnamed(
+    missing: Sequence[MissingStress], after: Sequence[Signature]
+) -> Unnamed | None:
+    """Return a description of the residual that no family explains; None without records."""
     if not missing:
         return None
     largest = max(missing, key=lambda m: float(np.var(m.stress)))
     terms, share = _pursuit(largest)
     if share < _FORMULA_SHARE_MIN:
-        return Unnamed(_where(after), "", f"no short formula explains it. {look}")
+        return Unnamed(_where(after), "", f"no short formula explains it. {looks(after)}")
     formula = " ".join(f"{c:+.3g} {name}" for name, c in terms)
     return Unnamed(
         _where(after),
         f"p/Pa = {formula}",
         f"the formula explains {100 * share:.0f} % of the missing stress in the parts of the time "
-        f"that it was not fitted to. {look}",
+        f"that it was not fitted to. {looks(after)}",
     )
 
 
-def _values(step: Step) -> str:
-    return ", ".join(f"{e.name} = {e.value:.4g} {e.unit}".strip() for e in step.estimates)
+def looks(after: Sequence[Signature]) -> str:
+    """Return what is remarkable in the residual of each record, in words."""
+    return "; ".join(f"{s.record}: {', '.join(s.words)}" for s in after)
 
 
 def _where(after: Sequence[Signature]) -> str:

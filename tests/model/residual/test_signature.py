@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from dearig.model.diagnosis.residual import signatures
+from dearig.model.residual.signature import signatures
 from tests.tools.engine import (
     NOISE,
     PLAIN,
