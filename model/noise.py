@@ -16,14 +16,18 @@ from dearig.model.errors import ModelError
 
 __all__ = [
     "DIFFERENCES",
+    "FEW_VALUES",
     "LEAD_IN",
     "NOISE_MARGIN",
     "READINGS_MIN",
     "Tails",
     "about_rest",
+    "coarse_noise",
     "noise_at_rest",
     "noise_of",
     "require_readings",
+    "rest_of_rounded",
+    "rounding",
     "tails_of",
 ]
 
@@ -43,6 +47,14 @@ _FREEDOMS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0)
 _SCALES = 60  # of the middle, tried: in steps of 3 %, as 500 readings tell it
 _TAILS_READINGS = 2000  # of the lead-in, the first ones, that tell the tails
 _SAME = 1e-6  # of the spread: differences that are rounding of the computer
+#: Step over the noise in motion, 1/sqrt(1/9 + 1/12), from which rounding counts: a step is three
+#: times the noise before rounding, and the mean of readings at rest off by up to a tenth of that.
+_COARSE = 2.27
+#: Values that coarse readings take at rest, at most: a step is three times their noise.
+FEW_VALUES = 4
+_BLOCK = 100  # readings: their second differences tell the noise to some 10 %
+_LEVELS = 201  # of a rest between two readings, tried
+_SHARPEST = 0.05  # of a step: less noise before rounding changes nothing
 _TAILS_MIN = 12.0  # of twice the logarithm of a likelihood
 _LINE_FOUND = 1e-5  # of a frequency bin: moves the sine's end by some 1e-5 of a period
 
@@ -126,19 +138,17 @@ class Tails:
         return np.asarray(noise * (self.freedom + 3.0) / (self.freedom + square))
 
 
-def tails_of(noise: np.ndarray, independent: float = 1.0) -> Tails:
+def tails_of(noise: np.ndarray, step: float, independent: float = 1.0) -> Tails:
     """Return the more probable distribution of ``noise`` (N,) about 0: normal, or Student's t.
 
-    The likelihood is that of rounded readings. Student's t is taken where twice the logarithm of
-    the likelihoods' ratio, times the share of the readings that is ``independent``, is above 12:
-    what the diagnosis asks of an effect.
+    The likelihood is that of readings that were rounded to a ``step``. Student's t is taken where
+    twice the logarithm of the likelihoods' ratio, times the share of the readings that is
+    ``independent``, is above 12: what the diagnosis asks of an effect.
     """
     noise = noise[:_TAILS_READINGS]
-    levels = np.diff(np.unique(noise))
     spread = float(np.std(noise))
-    step = float(np.min(levels[levels > _SAME * spread], initial=math.inf))
-    if not math.isfinite(step):
-        return Tails(math.inf, spread)
+    if spread == 0.0:
+        return Tails(math.inf, spread, step)
     # an even rule over what is rounded to one reading
     square = (noise[:, None] + step * np.linspace(-0.4, 0.4, 5)) ** 2
     scales = spread * np.geomspace(0.2, 1.2, _SCALES)
@@ -163,6 +173,58 @@ def tails_of(noise: np.ndarray, independent: float = 1.0) -> Tails:
     if 2.0 * independent * (found[0] - normal) > _TAILS_MIN:
         return Tails(found[2], found[1], step)
     return Tails(math.inf, width, step)
+
+
+def rounding(values: np.ndarray) -> float:
+    """Return the step of which readings (N,) are multiples; 0 where they are of no step.
+
+    A converter makes the step of a sensor uneven by one of its own: it is a mean.
+    """
+    levels = np.unique(values)
+    steps = np.diff(levels)
+    if not steps.size or float(steps.min()) < _SAME * float(np.ptp(levels)):
+        return 0.0
+    return float(np.mean(steps[steps < 1.5 * steps.min()]))
+
+
+def coarse_noise(values: np.ndarray, valid: np.ndarray | None = None) -> tuple[float, float]:
+    """Return the noise of coarsely rounded readings (N,) in motion, and their step; else zeros.
+
+    Readings at rest do not tell it: they may all be rounded to one value. In motion the error of
+    rounding is spread over the step. The noise is the median over blocks of that of second
+    differences where the film moves, so that ringing now and then does not count. Readings are
+    coarse from a step of 2.27 times that on.
+    """
+    count = values.size // _BLOCK
+    if not count:
+        return 0.0, 0.0
+    usable = np.ones(values.size, dtype=bool) if valid is None else valid
+    blocks = zip(np.array_split(values, count), np.array_split(usable, count), strict=True)
+    moving = [noise_of(block, good) for block, good in blocks if np.unique(block).size > FEW_VALUES]
+    if not moving:
+        return 0.0, 0.0
+    noise, step = float(np.median(moving)), rounding(values[usable])
+    return (noise, step) if step > _COARSE * noise > 0.0 else (0.0, 0.0)
+
+
+def rest_of_rounded(values: np.ndarray, step: float, noise: float) -> float:
+    """Return the mean that readings (N,) at rest would have without their rounding to ``step``.
+
+    ``noise`` is that in motion, rounding included. The mean of rounded readings is off by up to
+    half a step where they are nearly all rounded to one value. It is the mean of the posterior
+    under a flat prior (a likelihood of grouped readings).
+    """
+    # takes a while to import, and few sensors are so coarse
+    from scipy.special import ndtr
+
+    levels, counts = np.unique(values, return_counts=True)
+    before = math.sqrt(max(noise**2 - step**2 / 12.0, (_SHARPEST * step) ** 2))
+    rests = np.linspace(levels[0] - 0.5 * step, levels[-1] + 0.5 * step, _LEVELS)
+    apart = levels - rests[:, None]
+    inside = ndtr((apart + 0.5 * step) / before) - ndtr((apart - 0.5 * step) / before)
+    logs = np.log(np.maximum(inside, 1e-300)) @ counts
+    weights = np.exp(logs - logs.max())
+    return float(weights @ rests / weights.sum())
 
 
 def require_readings(values: np.ndarray) -> None:

@@ -11,12 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.analysis.spikes import spikes
 from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, VACUUM_PERMITTIVITY, Film
+from dearig.model.spikes import spikes
 from dearig.recording.recording import Recording
 
-__all__ = ["Quality", "check_enough", "driven_by", "extrapolated", "few_data", "inspect", "overlap"]
+__all__ = [
+    "Quality",
+    "check_enough",
+    "driven_by",
+    "extrapolated",
+    "few_data",
+    "inspect",
+    "overlap",
+    "spikes_about",
+]
 
 #: With fewer samples there are no statistics of a recording to compare a sample with.
 _SAMPLES_MIN = 20
@@ -24,6 +33,7 @@ _SAMPLES_MIN = 20
 _MODULUS = 1e5
 _DRIVE_RATIO = 1.05  # of the largest drive to that of the training data: extrapolation from here
 _DURATION_RATIO = 3.0  # the same for the duration
+_RINGS = 6  # samples: two periods of ringing at a third of the rate
 _MARGIN = 2  # samples on either side of a faulty one that are masked with it
 
 
@@ -82,6 +92,24 @@ def inspect(recording: Recording, drive: str = "command", *, to_fit: bool = True
     valid = ~bad
     valid.setflags(write=False)
     return Quality(valid, tuple(findings))
+
+
+def spikes_about(
+    recording: Recording, residual: np.ndarray, usable: np.ndarray, pull: np.ndarray
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return which readings (N,) are spikes about a model, and a sentence on them.
+
+    ``residual`` (N,) is measured less model, ``pull`` (N,) what moves the film. Where the film
+    rings, only a model tells a spike from its motion.
+    """
+    if recording.noise is None or recording.noise.step:
+        return np.zeros_like(usable), ()
+    left = np.interp(recording.time, recording.time[usable], residual[usable])
+    found = spikes(recording.time, left, pull, recording.quiet_samples) & usable
+    if not found.any():
+        return found, ()
+    places = [(int(i), int(i) + 1) for i in np.flatnonzero(found)]
+    return found, (_where(recording, "a single reading is far off the model", places),)
 
 
 def check_enough(recordings: Sequence[Recording], drive: str = "command") -> None:
@@ -405,7 +433,10 @@ def _stuck(time: np.ndarray, signal: np.ndarray, moved: np.ndarray) -> list[tupl
 
 
 def _outliers(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
-    """Return runs of up to 5 outliers between neighbours that agree, while the drive is steady."""
+    """Return runs of up to 5 outliers between neighbours that agree, while the drive is steady.
+
+    Where most of the steps before or after are as large, the film rings.
+    """
     steps = np.diff(signal)
     noise = 1.4826 * float(np.median(np.abs(np.diff(signal, 2)))) / 6.0**0.5
     span = float(np.subtract(*np.percentile(signal, (99.0, 1.0))))
@@ -420,7 +451,13 @@ def _outliers(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
         for b in range(a + 1, min(a + 6, signal.size - 1)):
             back = signal[b] - signal[b - 1]
             if abs(back) > far and back * steps[i] < 0.0:
-                calm = max(abs(signal[b] - signal[a - 1]), abs(steps[i - 1]), abs(steps[b]))
+                calm = max(
+                    abs(signal[b] - signal[a - 1]),
+                    abs(steps[i - 1]),
+                    abs(steps[b]),
+                    float(np.median(np.abs(steps[max(i - _RINGS, 0) : i]))),
+                    float(np.median(np.abs(steps[b : b + _RINGS]))),
+                )
                 still = float(np.ptp(moved[a - 1 : b + 1])) < 0.05 * drive_span
                 if calm < 0.3 * min(abs(steps[i]), abs(back)) and still:
                     found.append((a, b))

@@ -12,7 +12,7 @@ import numpy as np
 import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.analysis.outcomes import Comparison, Published
-from dearig.analysis.quality import driven_by, inspect
+from dearig.analysis.quality import driven_by, inspect, spikes_about
 from dearig.config.presets import PRESETS, VALIDATION_A, VALIDATION_B
 from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError
@@ -24,7 +24,7 @@ from dearig.model.errors import ModelError
 from dearig.model.excitation import Lobes
 from dearig.model.film import Strip
 from dearig.model.measures import errors
-from dearig.model.noise import LEAD_IN, require_readings
+from dearig.model.noise import LEAD_IN, require_readings, rest_of_rounded
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
 from dearig.recording.early_end import early_end
 from dearig.recording.layout import SIGNALS
@@ -123,7 +123,8 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
     """Return the record that a fit takes; ``drive`` is command or monitor, for actuators.
 
     The noise is that of ``reading_noise_of``. Readings that must not be used (see
-    ``dearig.analysis.quality``) are masked, and replaced by a line across them.
+    ``dearig.analysis.quality``) are masked, and replaced by a line across them. Coarse readings at
+    rest are masked as well: all of them are rounded alike, so they say no more than their zero.
     """
     try:
         if recording.kind == "film":
@@ -133,16 +134,19 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
             noise = reading_noise_of(recording, valid)
             stress = _bridged(recording.time, stress, valid)
             return FilmRecord(recording.name, recording.time, stretch, stress, noise.value, valid)
-        displacement = _present(recording.displacement)
+        displacement = _from_rest(recording)
         reading_noise_of(recording, None)
         driven = recording_drive(recording, drive)
         valid = inspect(recording, drive).valid
         displacement = _bridged(recording.time, displacement, valid)
+        noise = reading_noise_of(recording, valid)
+        if noise.step:
+            valid = ~recording.quiet if valid is None else valid & ~recording.quiet
         return ActuatorRecord(
             recording.name,
             driven,
             displacement,
-            reading_noise_of(recording, valid).value,
+            noise.value,
             recording.displacement_delay - recording.displacement_skew,
             valid,
             _lead_in(recording),
@@ -175,9 +179,23 @@ def noise_sentences(recordings: Iterable[Recording]) -> list[str]:
         if recording.kind == "actuator" and noise is not None and noise.source != LEAD_IN:
             said.append(
                 f"{recording.name}: the noise, {noise.value * 1e6:.3g} um, is {noise.words}; fast "
-                f"motion counts in it, and the zero of displacement is known to one reading only"
+                f"motion counts in it, and the zero of displacement is known to "
+                f"{'a part of a step' if noise.step else 'one reading'} only"
             )
     return said
+
+
+def _from_rest(recording: Recording) -> np.ndarray:
+    """Return the displacement (N,) in m from the rest state.
+
+    Its zero is the mean of the lead-in; that of coarse readings, which rounding shifts, is the most
+    probable one.
+    """
+    displacement, noise = _present(recording.displacement), recording.noise
+    if noise is None or not noise.step or not _lead_in(recording):
+        return displacement
+    at_rest = displacement[: recording.quiet_samples]
+    return displacement - rest_of_rounded(at_rest, noise.step, noise.value)
 
 
 def _lead_in(recording: Recording) -> int:
@@ -273,7 +291,7 @@ def compare(
     """
     look = inspect(recording, drive, to_fit=False)
     warnings = list(look.findings)
-    signal = recording.signal
+    signal = recording.signal if recording.kind == "film" else _from_rest(recording)
     usable = np.ones(signal.size, dtype=bool) if look.valid is None else look.valid
     if recording.kind == "film":
         if isinstance(model, Actuator):
@@ -311,6 +329,9 @@ def compare(
             raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
         predicted = counted(response.displacement, _lead_in(recording))
         driven = drive_of.voltage
+        spiky, said = spikes_about(recording, signal - predicted, usable, driven**2)
+        usable = usable & ~spiky
+        warnings += said
         table, row, published = _place(recording)
     noise = recording.noise if look.valid is None else recording.noise_of_valid(look.valid)
     ended = early_end(recording)

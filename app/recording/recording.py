@@ -18,7 +18,12 @@ from dearig.recording.arrays import Arrays, Overview
 from dearig.recording.environment import MEANS, Environment, mean_conditions
 from dearig.recording.files import file_sha256
 from dearig.recording.layout import SIGNALS, UNITS, variable_attributes
-from dearig.recording.rest_noise import MIN_QUIET, ReadingNoise, noise_of_readings
+from dearig.recording.rest_noise import (
+    MIN_QUIET,
+    ReadingNoise,
+    noise_of_readings,
+    takes_few_values,
+)
 
 if TYPE_CHECKING:
     import pandas
@@ -267,7 +272,8 @@ class Recording:
             return None
         quiet, end = min(self.quiet_samples, NOISE_MAX), min(self.samples, NOISE_MAX)
         # only the lead-in is read where it is enough
-        for last in (quiet, end) if quiet >= MIN_QUIET else (end,):
+        enough = quiet >= MIN_QUIET and not takes_few_values(self.arrays.window(name, 0, quiet))
+        for last in (quiet, end) if enough else (end,):
             time, readings = (self.arrays.window(n, 0, last) for n in ("time", name))
             usable = None if valid is None else valid[:last]
             found = noise_of_readings(time, readings, quiet, usable)

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.model.noise import DIFFERENCES, LEAD_IN, READINGS_MIN, noise_at_rest, noise_of
+from dearig.model.noise import (
+    DIFFERENCES,
+    FEW_VALUES,
+    LEAD_IN,
+    READINGS_MIN,
+    coarse_noise,
+    noise_at_rest,
+    noise_of,
+)
 
 __all__ = [
     "MIN_QUIET",
@@ -17,6 +25,7 @@ __all__ = [
     "mean_beyond_noise",
     "noise_floor",
     "noise_of_readings",
+    "takes_few_values",
 ]
 
 #: Least number of samples for an estimate of the noise.
@@ -77,18 +86,22 @@ def _steady(voltage: np.ndarray, largest: float) -> int:
 class ReadingNoise:
     """Standard deviation ``value`` of one reading, in its unit, and where it is from.
 
-    ``source`` is ``LEAD_IN`` or ``DIFFERENCES``; ``count`` are the readings at rest.
+    ``source`` is ``LEAD_IN`` or ``DIFFERENCES``; ``count`` are the readings at rest. ``step`` is
+    that of coarse readings, which are rounded to more than their noise; 0 of others.
     """
 
     value: float
     source: str
     count: int
+    step: float = 0.0
 
     @property
     def words(self) -> str:
         """Where it is from."""
         if self.source == LEAD_IN:
             return f"over {self.count} samples at 0 V"
+        if self.step:
+            return "from second differences: the readings come in steps larger than their noise"
         if self.count >= MIN_QUIET:
             return "from second differences: the readings at 0 V at the start do not change"
         if self.count:
@@ -102,11 +115,17 @@ def noise_of_readings(
     """Return the noise of ``values`` (N,) whose first ``quiet`` are at rest.
 
     Readings that are not ``valid`` (N,) take no part. Where fewer than 20 are at rest, it is that
-    of all second differences, which counts fast motion as noise. None where nothing changes.
+    of all second differences, which counts fast motion as noise; and where readings at rest take
+    few values, that of second differences in motion, if they are so coarse. None where nothing
+    changes.
     """
     at_rest = slice(0, quiet) if valid is None else np.flatnonzero(valid[:quiet])
     time_at_rest, at_rest_values = time[at_rest], values[at_rest]
     count = int(at_rest_values.size)
+    if takes_few_values(at_rest_values):
+        noise, step = coarse_noise(values, valid)
+        if noise > 0.0:
+            return ReadingNoise(noise, DIFFERENCES, count, step)
     if count >= MIN_QUIET:
         value = noise_at_rest(time_at_rest, at_rest_values)
         if value > 0.0:
@@ -115,6 +134,11 @@ def noise_of_readings(
         return None
     value = noise_of(values, valid)
     return ReadingNoise(value, DIFFERENCES, count) if value > 0.0 else None
+
+
+def takes_few_values(at_rest: np.ndarray) -> bool:
+    """Whether readings (n,) ``at_rest`` may be so coarse that they do not tell their noise."""
+    return np.unique(at_rest).size <= FEW_VALUES
 
 
 def noise_floor(time: np.ndarray, values: np.ndarray) -> float | None:

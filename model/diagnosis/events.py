@@ -16,6 +16,7 @@ from dearig.model import kernel
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit, Fitter, fit_of, with_effect
+from dearig.model.diagnosis.preparation import without_spikes
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import typical_values
 from dearig.model.effects import EFFECTS
@@ -69,6 +70,10 @@ def own_of(
     a difference of the whole recording and no event. An effect acts at one moment of a recording,
     so of two events of one kind the larger is found.
     """
+    response = model.simulate(record.drive, record.lag)
+    if response.ok:
+        bare = without_spikes(record, record.displacement - record.seen(response.displacement))
+        record = bare if isinstance(bare, ActuatorRecord) else record
     fitter = Fitter([record], replace(model, effects=()), settings or DiagnosisSettings(), 1)
     fitter.read_colour(others)
     plain = _as_it_is(fitter.problem(model))

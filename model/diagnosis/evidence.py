@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.model.diagnosis.fits import DRIFT, Fit
+from dearig.model.diagnosis.preparation import at_rest
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting.intervals import correlation_time, has_spectrum_of, is_flat
@@ -34,7 +35,7 @@ def family_of(member: str) -> str:
 def _coloured_rest(baseline: Fit) -> tuple[np.ndarray, ...]:
     """Return each record's readings before its voltage, where they are not white; else ()."""
     rest = [
-        part[: getattr(record, "lead_in", 0)]
+        part[at_rest(record)]
         for part, record in zip(baseline.by_record(), baseline.problem.records, strict=True)
     ]
     if min(part.size for part in rest) < _REST_MIN or all(map(is_flat, rest)):

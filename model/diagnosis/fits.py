@@ -12,7 +12,12 @@ import numpy as np
 
 from dearig.model import kernel
 from dearig.model.actuator import Actuator
-from dearig.model.diagnosis.preparation import prepared, with_model_error, without_tails
+from dearig.model.diagnosis.preparation import (
+    prepared,
+    with_model_error,
+    without_spikes,
+    without_tails,
+)
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
@@ -176,7 +181,7 @@ def with_effect(model: Actuator | Strip, name: str, values: Sequence[float]) -> 
 class Fitter:
     """Training ``records``, ``full`` and as the search uses them, and the fits made to them.
 
-    ``raw`` are the full ones as they were measured, noise with heavy tails included.
+    ``raw`` are the full ones without spikes, noise with heavy tails included.
     ``watched`` is called after each population of simulations, from any thread, and may raise to
     end the search.
     """
@@ -237,25 +242,28 @@ class Fitter:
         return self._space[full]
 
     def read_noise(self, model: Actuator | Strip) -> None:
-        """Read the noise at rest; later problems are those of its tails and its colour.
+        """Read the noise at rest; later problems are without spikes, of its tails and its colour.
 
         ``model`` is fitted to the records. Springs are sought in white normal noise: in slow noise
         their likelihood has more valleys.
         """
-        self.records = self._without_tails(self.records, model, kernel.QUICK)
-        self.full = self._without_tails(self.raw, model, kernel.CAREFUL)
+        _, self.records = self._cleaned(self.records, model, kernel.QUICK)
+        self.raw, self.full = self._cleaned(self.raw, model, kernel.CAREFUL)
         self.read_colour()
 
-    def _without_tails(
+    def _cleaned(
         self, records: Sequence[Record], model: Actuator | Strip, fidelity: int
-    ) -> tuple[Record, ...]:
+    ) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
+        """Return ``records`` without spikes, and without heavy tails as well."""
         layout = Layout(model)
         x = layout.coordinates(layout.initial())
-        found = []
+        whole, normal = [], []
         for record in records:
             problem = WhitenedProblem([record], layout, workers=1, fidelity=fidelity)
-            found.append(without_tails(record, -problem.residuals(x) * record.noise))
-        return tuple(found)
+            residual = -problem.residuals(x) * record.noise
+            whole.append(without_spikes(record, residual))
+            normal.append(without_tails(whole[-1], residual))
+        return tuple(whole), tuple(normal)
 
     def read_colour(self, others: Sequence[Record] = ()) -> None:
         """Read the 1/f noise of the records at rest; the noise of later problems has it.

@@ -11,14 +11,17 @@ from dearig.model.actuator import Actuator
 from dearig.model.film import Strip
 from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.thinning import thinned
-from dearig.model.noise import about_rest, noise_at_rest, tails_of
+from dearig.model.noise import about_rest, noise_at_rest, rounding, tails_of
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, bridged, counted
+from dearig.model.spikes import spikes
 
 __all__ = [
     "FILM_MODEL_ERROR",
+    "at_rest",
     "has_line_at_rest",
     "prepared",
     "with_model_error",
+    "without_spikes",
     "without_tails",
 ]
 
@@ -66,14 +69,14 @@ def _thinned(record: Record, model: Actuator | Strip) -> Record:
 
 def has_line_at_rest(record: Record) -> bool:
     """Whether something periodic is in the readings before the voltage."""
-    rest = _at_rest(record)
+    rest = at_rest(record)
     if not isinstance(record, ActuatorRecord) or rest.size < _QUIET_MIN:
         return False
     _, numbers = about_rest(record.time[rest], record.displacement[rest])
     return numbers > 2  # of a straight line
 
 
-def _at_rest(record: Record) -> np.ndarray:
+def at_rest(record: Record) -> np.ndarray:
     """Return the places (n,) of the usable readings before the voltage."""
     lead_in = record.lead_in if isinstance(record, ActuatorRecord) else 0
     usable = np.arange(lead_in)
@@ -89,6 +92,24 @@ def with_model_error(record: Record) -> Record:
     return replace(record, noise=math.hypot(record.noise, error))
 
 
+def without_spikes(record: Record, residual: np.ndarray) -> Record:
+    """Return ``record`` without single readings that are far off a model, masked and bridged.
+
+    ``residual`` (N,) is measured less model in m. Where the film rings, no smooth curve through the
+    readings shows a spike, but the model knows how it rings.
+    """
+    if not isinstance(record, ActuatorRecord) or at_rest(record).size < _QUIET_MIN:
+        return record
+    left = bridged(record, residual)
+    found = spikes(record.time, left, record.drive.voltage**2, record.lead_in)
+    if not found.any():
+        return record
+    valid = ~found if record.valid is None else record.valid & ~found
+    spiky = replace(record, valid=valid)
+    change = np.where(found, bridged(spiky, left) - left, 0.0)
+    return replace(spiky, displacement=record.displacement + change)
+
+
 def without_tails(record: Record, residual: np.ndarray) -> Record:
     """Return ``record`` with pseudo-values in place of readings whose noise has heavy tails.
 
@@ -101,11 +122,12 @@ def without_tails(record: Record, residual: np.ndarray) -> Record:
     if not isinstance(record, ActuatorRecord):
         return record
     usable = np.ones(residual.size, dtype=bool) if record.valid is None else record.valid
-    rest = _at_rest(record)
+    rest = at_rest(record)
     if rest.size < _QUIET_MIN:
         return record
-    at_rest, _ = about_rest(record.time[rest], record.displacement[rest])
-    tails = tails_of(at_rest, 1.0 / correlation_time(at_rest))
+    still, _ = about_rest(record.time[rest], record.displacement[rest])
+    step = rounding(record.displacement[rest])
+    tails = tails_of(still, step, 1.0 / correlation_time(still))
     if tails.is_normal:
         return record
     about = np.ones(2 * _LEVEL + 1)

@@ -24,13 +24,25 @@ NOISE = 2e-6
 MODEL = Actuator(THESIS_FILM, THESIS_LOAD, Network.gent((60e3,), (1e4,), ()))
 
 
-def recorded(folder: Path, rest: float, dropout: bool = False) -> Recording:
-    """A slow rise of the voltage after ``rest`` s at 0 V, read at 100 Hz."""
+def recorded(
+    folder: Path,
+    rest: float,
+    dropout: bool = False,
+    travel: float = 1e-4,
+    step: float = 0.0,
+    at: float = 0.0,
+) -> Recording:
+    """A slow rise of the voltage after ``rest`` s at 0 V, read at 100 Hz.
+
+    ``travel`` m at 10 kV are read from a rest ``at`` m in steps of ``step`` m.
+    """
     time = np.arange(400) / 100.0
     volts = np.where(time < rest, 0.0, 2000.0 * (time - rest) + 1.0)
-    read = 1e-4 * (volts / 1e4) ** 2 + NOISE * np.random.default_rng(3).standard_normal(time.size)
+    read = travel * (volts / 1e4) ** 2 + NOISE * np.random.default_rng(3).standard_normal(time.size)
     if dropout:
         read[20:22] += 3e-3
+    if step:
+        read = step * np.round((read + at) / step)
     path, out = folder / "in.csv", folder / "run.h5"
     rows = (f"{t},{v},{1e3 * d}" for t, v, d in zip(time, volts, read, strict=True))
     path.write_text("\n".join(["time_s,voltage_V,displacement_mm", *rows]), "utf-8")
@@ -55,6 +67,28 @@ def test_info_fits_and_comparisons_agree(tmp_path: Path, rest: float, source: st
     else:
         assert "from second differences" in row
         assert row.partition(", ")[2] in sentences[0]
+
+
+@pytest.mark.parametrize("at", [0.0, 4e-6, 6e-6])
+def test_coarse_readings_tell_neither_noise_nor_zero_at_rest(tmp_path: Path, at: float) -> None:
+    step = 6.0 * NOISE
+    run = recorded(tmp_path, 2.0, travel=1e-2, step=step, at=at)
+    record, compared = as_record(run), compare(run, MODEL, "train")
+    assert record.noise == compared.noise == describe(run)["noise_floor_m"]
+    assert record.noise == pytest.approx(np.hypot(NOISE, step / np.sqrt(12.0)), rel=0.15)
+    # rounded alike, they are no 200 readings of the zero
+    assert record.valid is not None
+    assert not record.valid[: record.lead_in].any()
+    assert record.valid[record.lead_in :].all()
+    np.testing.assert_allclose(record.displacement, compared.measured, atol=1e-12)
+    true = 1e-2 * (record.drive.voltage / 1e4) ** 2
+    moving = slice(record.lead_in, None)
+    off = float(np.mean(record.displacement[moving] - true[moving]))
+    # 200 readings of 4 um have a mean to 0.3 um, and the zero is known to a part of the noise
+    assert abs(off) < 0.6 * NOISE
+    row, sentences = dict(describe_rows(run))["noise floor"], noise_sentences([run])
+    assert "in steps larger than their noise" in row
+    assert "the zero of displacement is known to a part of a step only" in sentences[0]
 
 
 def test_readings_that_are_not_used_are_not_in_the_noise(tmp_path: Path) -> None:

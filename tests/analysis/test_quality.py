@@ -13,7 +13,7 @@ from dearig.analysis.compatibility import check_apart
 from dearig.analysis.quality import check_enough, extrapolated, inspect, overlap
 from dearig.analysis.records import as_record, compare, recording_drive
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
+from dearig.model.actuator import Actuator, Drive
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.recording import open_recording
 from dearig.recording.metadata import RunMetadata
@@ -162,6 +162,23 @@ class TestMasks:
         assert masked.errors.samples == sound.errors.samples - 5
         assert np.isnan(masked.measured[698:703]).all()
         assert "drops out" in masked.warnings[0]
+
+    def test_a_spike_while_the_film_rings_is_told_by_the_model(self, keep):
+        values = lobes()
+        model = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+        # a step of the voltage, after which the film rings for seconds
+        volts = values["voltage_command"] = np.where(values["time"] < 1.0, 0.0, 1.5e3)
+        volts[-200:] = 0.0
+        moved = model.simulate(Drive(values["time"], volts)).displacement
+        values["displacement"] = moved + np.random.default_rng(5).normal(0.0, NOISE, moved.size)
+        values["displacement"][300] += 30e-6
+        assert np.ptp(np.diff(moved, 2)[280:320]) > 10.0 * NOISE
+        recording = keep(values)
+        assert inspect(recording).valid is None
+        compared = compare(recording, model, "validation")
+        assert np.flatnonzero(np.isnan(compared.measured)).tolist() == [300]
+        assert "a single reading is far off the model" in compared.warnings[-1]
+        assert compared.errors.rms < 1.2 * NOISE
 
     def test_an_overlong_fault_is_refused(self, keep):
         values = lobes()

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from dearig.model.errors import ModelError
-from dearig.model.noise import Tails, noise_at_rest, noise_of, tails_of
+from dearig.model.noise import (
+    Tails,
+    coarse_noise,
+    noise_at_rest,
+    noise_of,
+    rest_of_rounded,
+    rounding,
+    tails_of,
+)
 
 
 @pytest.mark.parametrize("slope", [0.0, 1.0, -300.0])
@@ -67,7 +75,7 @@ def test_normal_noise_has_no_heavy_tails():
         found = []
         for _ in range(20):
             values = rng.standard_normal(400)
-            found.append(tails_of(step * np.round(values / step) if step else values))
+            found.append(tails_of(step * np.round(values / step) if step else values, step))
         assert all(tails.is_normal for tails in found)
         assert np.mean([tails.scale for tails in found]) == pytest.approx(1.0, rel=0.05)
 
@@ -76,12 +84,19 @@ def test_normal_noise_has_no_heavy_tails():
 def test_heavy_tails_are_found_with_their_scale(step):
     rng = np.random.default_rng(2)
     values = rng.standard_t(4.0, (20, 400))
-    found = [tails_of(step * np.round(v / step) if step else v) for v in values]
+    found = [tails_of(step * np.round(v / step) if step else v, step) for v in values]
     heavy = [tails for tails in found if not tails.is_normal]
     # of 400 readings that are rounded to their scale, a few do not show it
     assert len(heavy) >= 17
     assert np.median([tails.freedom for tails in heavy]) == pytest.approx(4.0, abs=1.0)
     assert np.median([tails.scale for tails in heavy]) == pytest.approx(1.0, rel=0.1)
+
+
+def test_few_values_at_rest_are_no_heavy_tails():
+    # 333 readings at one value and 68 at the next, as normal noise far smaller than a step
+    noise = np.repeat([0.0, 6.0], [333, 68]) - 6.0 * 68 / 401
+    assert tails_of(noise, 6.0).is_normal
+    assert not tails_of(noise, 0.0).is_normal
 
 
 def test_pseudo_values_know_the_level_as_well_as_any_estimate_can():
@@ -96,3 +111,52 @@ def test_pseudo_values_know_the_level_as_well_as_any_estimate_can():
 def test_a_limit_is_that_of_the_distribution():
     assert Tails(math.inf, 2.0).limit(0.05) == pytest.approx(2.0 * 1.959964)
     assert Tails(4.0, 1.0).limit(0.01) == pytest.approx(4.604095)
+
+
+def rounded(values, step, converter=0.0):
+    """Values in steps, as a converter of finer steps reads them."""
+    read = step * np.round(values / step)
+    return converter * np.round(read / converter) if converter else read
+
+
+@pytest.mark.parametrize("converter", [0.0, 1.22])
+@pytest.mark.parametrize("step", [4.0, 6.0, 15.0])
+def test_coarse_readings_tell_their_noise_in_motion(step, converter):
+    rng = np.random.default_rng(8)
+    time = np.arange(5000) / 200.0
+    motion = 800.0 * np.sin(2.0 * np.pi * 0.3 * time) ** 2
+    motion[2000:2200] += 30.0 * np.sin(2.0 * np.pi * 60.0 * time[2000:2200])  # rings for a second
+    values = rounded(motion + rng.standard_normal(5000), step, converter)
+    assert rounding(values) == pytest.approx(step, rel=0.02)
+    noise, told = coarse_noise(values)
+    assert told == rounding(values)
+    # neighbours that are rounded one up and one down are less alike than by chance
+    assert noise == pytest.approx(math.hypot(1.0, step / math.sqrt(12.0)), rel=0.12)
+
+
+def test_fine_readings_are_not_coarse():
+    rng = np.random.default_rng(9)
+    motion = 800.0 * np.sin(np.arange(5000) / 100.0)
+    for step in (0.0, 0.1, 1.2, 2.0):
+        values = motion + rng.standard_normal(5000)
+        assert coarse_noise(rounded(values, step) if step else values) == (0.0, 0.0)
+    assert coarse_noise(np.zeros(5000)) == (0.0, 0.0)
+    assert rounding(np.zeros(3)) == 0.0
+
+
+@pytest.mark.parametrize("step", [4.0, 6.0])
+def test_the_rest_of_rounded_readings_is_not_their_mean(step):
+    rng = np.random.default_rng(10)
+    noise = math.hypot(1.0, step / math.sqrt(12.0))
+    means, rests = [], []
+    for true in np.arange(0.0, step, 0.1):
+        values = rounded(true + rng.standard_normal(400), step)
+        means.append(values.mean() - true)
+        rests.append(rest_of_rounded(values, step, noise) - true)
+    # a likelihood of 400 readings in two or three groups: the rest is known to a part of the noise
+    assert float(np.sqrt(np.mean(np.square(rests)))) < 0.25
+    assert float(np.sqrt(np.mean(np.square(rests)))) < 0.5 * float(np.std(means))
+
+
+def test_a_rest_that_is_always_rounded_alike_is_in_the_middle():
+    assert rest_of_rounded(np.full(400, 12.0), 6.0, 6.0 / math.sqrt(12.0)) == pytest.approx(12.0)

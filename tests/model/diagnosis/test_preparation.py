@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from dearig.model.actuator import Drive
-from dearig.model.diagnosis.preparation import without_tails
+from dearig.model.diagnosis.preparation import without_spikes, without_tails
 from dearig.model.records import ActuatorRecord
 
 N, QUIET = 4000, 400
@@ -45,3 +47,28 @@ def test_what_a_model_could_explain_stays() -> None:
     mains = noise + 15e-6 * np.sin(2.0 * np.pi * 50.0 * TIME + 0.3)
     record = record_with(noise)
     assert without_tails(record, mains) is record
+
+
+def test_a_spike_in_ringing_is_told_by_the_model() -> None:
+    index = np.arange(N)
+    rings = np.where(index < QUIET, 0.0, 40e-6 * np.sin(2.0 * np.pi * 70.0 * TIME))
+    noise = 1e-6 * np.random.default_rng(2).standard_normal(N)
+    spiky = noise.copy()
+    places = [1000, 2350, 3500]
+    spiky[places] += [30e-6, -50e-6, 12e-6]
+    record = record_with(rings + spiky)
+    assert without_spikes(record, rings + spiky) is record  # no model, no spike
+    found = without_spikes(record, spiky)
+    assert found.valid is not None
+    assert np.flatnonzero(~found.valid).tolist() == places
+    # bridged along the model
+    assert np.max(np.abs((found.displacement - rings)[places])) < 3e-6
+    assert np.array_equal(found.displacement[found.valid], record.displacement[found.valid])
+    assert without_spikes(record_with(rings + noise), noise).valid is None
+
+
+def test_coarse_readings_at_rest_tell_no_spikes() -> None:
+    noise = 1e-6 * np.random.default_rng(3).standard_normal(N)
+    noise[2000] += 60e-6
+    record = replace(record_with(noise), valid=np.arange(N) >= QUIET)
+    assert without_spikes(record, noise) is record

@@ -3,18 +3,19 @@
 A sensor that loses its spot for one sample reads anything. No film moves so, and a model that is
 fitted to such readings is worse. Masked is one reading at a time, between neighbours that lie on a
 smooth curve within the noise at rest: a jump, a kink, ringing or a slow error shows in several
-readings, and stays.
+readings, and stays. Two spikes may be near each other, with good readings between.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import scipy  # loads its parts when they are first used, which a run may never do
 
-from dearig.model.noise import Tails, about_rest, tails_of
+from dearig.model.noise import Tails, about_rest, rounding, tails_of
 
 __all__ = ["spikes"]
 
@@ -40,13 +41,18 @@ _OFF_NOISE = math.sqrt(float(_OFF @ _OFF))
 #: 99 % of chi-square with four degrees of freedom: squared deviations of the eight neighbours from
 #: their cubic of four coefficients, in sum over the variance of normal noise.
 _BESIDE_MAX = 13.3
+#: Of what one reading may be off, for two: where the noise grows with the motion, two are far off
+#: among neighbours within the noise at rest more often than one is.
+_CLEAR = 2.0
+_SURE = 0.99  # of the same quantile, for two spikes with any number of neighbours
 
 
 def spikes(time: np.ndarray, signal: np.ndarray, pull: np.ndarray, quiet: int) -> np.ndarray:
     """Return which readings (N,) bool of ``signal`` (N,) are spikes.
 
-    ``pull`` (N,) is what moves the film. The first ``quiet`` readings are at rest: their
-    distribution, normal or Student's t, says how far off a reading may be.
+    It may be measured, or what a model leaves of it. ``pull`` (N,) is what moves the film. The
+    first ``quiet`` readings are at rest: their distribution, normal or Student's t, says how far
+    off a reading may be.
     """
     found = np.zeros(signal.size, dtype=bool)
     if quiet < _REST_MIN or signal.size < _OFF.size:
@@ -56,24 +62,60 @@ def spikes(time: np.ndarray, signal: np.ndarray, pull: np.ndarray, quiet: int) -
     limit = _OFF_NOISE * tails.limit(_MASKED_WRONGLY / signal.size) + tails.step
     # what the drive may have moved, just now or before, is no spike
     driven = scipy.ndimage.maximum_filter1d(np.abs(_off(pull)), 2 * _REACH + 1)
-    driven /= float(np.max(np.abs(pull)))
+    driven /= float(np.max(np.abs(pull))) or 1.0
     moved = _DRIVEN * float(np.ptp(signal)) * driven
     width = math.hypot(tails.scale, tails.step / math.sqrt(12.0))
     off = np.abs(_off(signal))
     far = np.flatnonzero(off - moved > limit)
     alone = [_beside(signal, i) < width and not _rings(off, i) for i in map(int, far)]
     found[far[alone]] = True
+    farthest = _CLEAR * tails.limit(_MASKED_WRONGLY / signal.size)
+    for i, j in _near_each_other(far, found):
+        if _are_two(signal, i, j, farthest, tails.step, width):
+            found[[i, j]] = True
     return found if np.mean(found) <= _FEW else np.zeros_like(found)
+
+
+def _near_each_other(far: np.ndarray, found: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Yield pairs of readings with others between, not both ``found``.
+
+    One is ``far`` off. The other one need not look so: the first bends its curve.
+    """
+    for i in map(int, far):
+        for apart in range(2, 2 * _REACH + 1):
+            for j in (i - apart, i + apart):
+                if 0 <= j < found.size and not (found[i] and found[j]):
+                    yield min(i, j), max(i, j)
+
+
+def _are_two(
+    signal: np.ndarray, i: int, j: int, farthest: float, step: float, width: float
+) -> bool:
+    """Whether readings ``i`` and ``j`` are two spikes: their neighbours are smooth without both."""
+    first, last = i - _REACH, j + _REACH + 1
+    if first < 0 or last > signal.size:
+        return False
+    at = np.arange(first, last)
+    good = (at != i) & (at != j)
+    curves = np.vander((at - 0.5 * (i + j)) / _REACH, 4, increasing=True)
+    fit = np.linalg.pinv(curves[good])
+    left = signal[first:last] - curves @ (fit @ signal[first:last][good])
+    most = scipy.stats.chi2.ppf(_SURE, np.count_nonzero(good) - 4)
+    if float(np.sum(left[good] ** 2)) > most * width**2:
+        return False
+    # the curve at a spike has an error of its own
+    error = np.sqrt(1.0 + np.sum((curves[~good] @ fit) ** 2, axis=1))
+    return bool(np.all(np.abs(left[~good]) > farthest * error + step))
 
 
 def _at_rest(time: np.ndarray, signal: np.ndarray) -> Tails:
     """Return the distribution of the noise at rest, without spikes where the rest is normal."""
     noise, _ = about_rest(time, signal)
-    size = np.abs(noise)
-    middle = tails_of(noise[size <= np.quantile(size, 1.0 - _FEW)])
+    size, step = np.abs(noise), rounding(signal)
+    middle = tails_of(noise[size <= np.quantile(size, 1.0 - _FEW)], step)
     if middle.is_normal:
         return replace(middle, scale=middle.scale / _CUT)
-    return tails_of(noise)
+    return tails_of(noise, step)
 
 
 def _off(values: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dearig.analysis.spikes import spikes
+from dearig.model.spikes import spikes
 
 N, QUIET, STEP = 4000, 400, 5e-3
 TIME = STEP * np.arange(N)
@@ -28,6 +28,16 @@ def test_isolated_spikes_are_found_in_motion_and_at_rest() -> None:
     assert found(signal) == places
 
 
+@pytest.mark.parametrize("apart", [2, 3, 5, 8])
+@pytest.mark.parametrize("sizes", [(30.0, 40.0), (-20.0, 35.0), (15.0, -60.0)])
+def test_two_spikes_near_each_other_are_found(apart, sizes) -> None:
+    signal = MOTION + noise(9)
+    for place in (200, 1234, 2611):
+        signal[[place, place + apart]] += 1e-6 * np.array(sizes)
+    wanted = [at for place in (200, 1234, 2611) for at in (place, place + apart)]
+    assert found(signal) == wanted
+
+
 def test_good_readings_are_masked_as_seldom_as_is_said() -> None:
     # 0.01 a recording: of 30 recordings, more than 2 once in 300 times
     assert sum(len(found(MOTION + noise(seed))) for seed in range(30)) <= 2
@@ -40,9 +50,10 @@ def test_good_readings_are_masked_as_seldom_as_is_said() -> None:
         lambda k: 20.0 * np.maximum(k, 0),
         lambda k: np.where(k >= 0, 30.0 * np.cos(2.2 * k) * np.exp(-np.maximum(k, 0) / 10.0), 0.0),
         lambda k: 20.0 * ((k == 0) | (k == 1)),
+        lambda k: np.where(k >= 0, 30.0 * np.cos(np.pi * k / 2.0) * np.exp(-k / 60.0), 0.0),
         lambda k: 40.0 * (k >= 0) * np.exp(-np.maximum(k, 0) / 3.0),
     ],
-    ids=["jump", "kink", "ringing", "two readings", "decay"],
+    ids=["jump", "kink", "ringing", "two readings", "ringing of four readings", "decay"],
 )
 def test_what_a_model_could_explain_stays(shape) -> None:
     for place in (1000, 2345):
