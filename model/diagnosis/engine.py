@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
 from dearig.model.diagnosis.preparation import has_line_at_rest
 from dearig.model.diagnosis.race import Candidate, race
-from dearig.model.diagnosis.regression import Regression, is_unseen
+from dearig.model.diagnosis.regression import Regression, Start, is_unseen
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS, Effect
 from dearig.model.environment import recorded_of
@@ -296,21 +296,7 @@ class Search:
         among = self.effects if among is None else among
         effects = [e for e in among if e.name not in parent.effects]
         starts = regression.starts(effects, extent)
-        fits = self._run(
-            parent,
-            regression,
-            [
-                Candidate(
-                    name,
-                    tuple(some),
-                    # the misfit does not show what it explains: the grid of springs imitates it,
-                    # or the regression does not see it
-                    (regression.springs_explain and EFFECTS[name].is_viscoelastic)
-                    or is_unseen(EFFECTS[name]),
-                )
-                for name, some in starts.items()
-            ],
-        )
+        fits = self._run(parent, starts)
         if fits and not self.judge.is_noise(fits[0]):
             fits = self._with_general(parent, regression, extent, fits)
         self.races.append(
@@ -333,16 +319,14 @@ class Search:
         """
         families = {family_of(name) for fit in fits for name in fit.members - parent.members}
         laws = [e for e in self.general if e.family in families and e.name not in parent.effects]
-        starts = regression.starts(laws, extent)
-        candidates = [Candidate(name, tuple(some), True) for name, some in starts.items()]
-        return self.judge.ranked([*fits, *self._run(parent, regression, candidates)])
+        return self.judge.ranked([*fits, *self._run(parent, regression.starts(laws, extent))])
 
-    def _run(
-        self, parent: Fit, regression: Regression, candidates: Sequence[Candidate]
-    ) -> list[Fit]:
+    def _run(self, parent: Fit, starts: Mapping[str, list[Start]]) -> list[Fit]:
         """Return the fits that came through one race, and keep them: the next may be the last."""
-        fits = race(self.fitter, self.judge, parent, regression.misfit, candidates)
-        return [self.keep(fit) for fit in fits]
+        candidates = [
+            Candidate(name, tuple(some), is_unseen(EFFECTS[name])) for name, some in starts.items()
+        ]
+        return [self.keep(fit) for fit in race(self.fitter, self.judge, parent, candidates)]
 
     def _regression(self, parent: Fit) -> tuple[Regression, Extent]:
         fitter, records = self.fitter, self.fitter.records

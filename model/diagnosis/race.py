@@ -15,8 +15,7 @@ import numpy as np
 from dearig.model import kernel
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import Fit, Fitter, with_effect
-from dearig.model.diagnosis.regression import Start, contention
-from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.diagnosis.regression import Start
 from dearig.model.diagnosis.shapes import typical_values
 from dearig.model.effects import EFFECTS
 
@@ -29,7 +28,7 @@ _TINY = 1e-3  # of the typical amplitude: an effect that hardly acts, and has a 
 class Candidate:
     """An effect that is added to a parent, and the starts of their fit, best first.
 
-    One that is ``certain`` runs in any case.
+    One that is ``certain`` enters in any case: the regression does not see what it explains.
     """
 
     effect: str
@@ -42,15 +41,12 @@ class Candidate:
         return self.starts[0].misfit
 
 
-def race(
-    fitter: Fitter, judge: Judge, parent: Fit, misfit: float, candidates: Sequence[Candidate]
-) -> list[Fit]:
-    """Return the fits of the candidates that came through the race, the most probable first.
-
-    ``misfit`` is what the regression leaves without a candidate.
-    """
+def race(fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
+    """Return the fits of the candidates that came through the race, the most probable first."""
     rungs = fitter.settings.rungs
-    entered = _contending(candidates, misfit, fitter.settings)
+    ranked = sorted(candidates, key=lambda c: c.misfit)
+    seen = [c for c in ranked if not c.certain]
+    entered = [*(c for c in ranked if c.certain), *seen[: rungs[0].effects]]
     first = fitter.map(lambda c: _entered(fitter, parent, c, rungs[0].iterations), entered)
     runners = [fit for fits in first for fit in fits]
     if not runners:
@@ -63,24 +59,6 @@ def race(
     runners = fitter.map(fitter.refined, runners)
     judge.see(runners)
     return _leading(judge, runners, len(runners), abreast=False)
-
-
-def _contending(
-    candidates: Sequence[Candidate], misfit: float, settings: DiagnosisSettings
-) -> list[Candidate]:
-    """Return the candidates of which the regression leaves open whether they may lead.
-
-    They explain at least the share of the settings of what the best explains. As many as enter the
-    last rung but one run in any case.
-    """
-    ranked = sorted(candidates, key=lambda c: c.misfit)
-    if not ranked:
-        return []
-    limit = contention(misfit, ranked[0].misfit, settings)
-    least, most = settings.rungs[-2].effects, settings.rungs[0].effects
-    certain = [c for c in ranked if c.certain]
-    others = [c for c in ranked if not c.certain][:most]
-    return [*certain, *(c for i, c in enumerate(others) if i < least or c.misfit < limit)]
 
 
 def _leading(judge: Judge, runners: Sequence[Fit], effects: int, abreast: bool) -> list[Fit]:

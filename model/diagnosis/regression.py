@@ -36,13 +36,12 @@ from dearig.model.film import Strip, unit_stresses
 from dearig.model.fitting.slow_noise import Drift, DriftSpace, drift_modes
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
-__all__ = ["Regression", "Start", "contention", "electric"]
+__all__ = ["Regression", "Start", "electric", "is_unseen"]
 
 _REST_STEP = 0.02  # of mu_0: the difference quotient of the misfit through the rest stretch
 _NEAR = 0.2  # relative: starts that differ by less are one
 _SECANT = (0.3, 3.3)  # coefficients of a secant: beyond, the next amplitude's is closer
 _PATTERN = (0.1, 0.05, 0.02)  # steps of the pattern search, in parts of a parameter's range
-_SHARPENED_MIN = 8  # effects, the best ones, that are sharpened in any case
 _LINEAR = 0.02  # relative difference of two secants up to which a response is linear
 _BRANCH_POOL = 8  # nodes of the grid, the most used ones, of which sets of branches are made
 _FLAT = 1e-6  # relative singular value: flatter directions are left alone
@@ -89,17 +88,6 @@ class _Columns:
 
 
 _Row = tuple[float, np.ndarray, _Columns]  # misfit, coefficients, columns
-
-
-def contention(misfit: float, best: float, settings: DiagnosisSettings) -> float:
-    """Return the misfit up to which an effect may come to lead: ``best`` is the least of all.
-
-    What explains less than a share of what the best one explains of the ``misfit`` without an
-    effect will not. The regression errs by about one noise itself: it contains derivatives of a
-    reading.
-    """
-    explained = misfit**2 - best**2
-    return math.sqrt(max(misfit**2 - settings.share * explained, 0.0) + 1.0)
 
 
 def electric(name: str) -> bool:
@@ -246,14 +234,6 @@ class Regression:
             rows.append(one.through(mu @ (parts - parts[:, :1])) - one.target())
         return self._joined(rows)
 
-    @property
-    def springs_explain(self) -> bool:
-        """Whether springs at other times explain the better part of what the model leaves."""
-        if not self._residuals.size:
-            return False
-        left = float(np.mean(self._residuals**2))
-        return left - self.misfit**2 > self.settings.share * max(left - 1.0, 0.0)
-
     # -- least squares
 
     def _rms(self, norm: float) -> float:
@@ -380,19 +360,12 @@ class Regression:
             some = sorted((row for row in tried if row is not None), key=lambda row: row[0])
             if some:
                 rows[effect.name] = _distinct(some, self.settings.starts)
-        best: dict[str, list[_Row]] = {}
-        least = min((some[0][0] for some in rows.values()), default=self.misfit)
-        for name in sorted(rows, key=lambda n: rows[n][0][0]):
-            some = rows[name]
-            limit = contention(self.misfit, least, self.settings)
-            if some[0][0] < limit or len(best) < _SHARPENED_MIN:
-                some = sorted(
-                    (self._sharpened(row, extent) for row in some), key=lambda row: row[0]
-                )
-                least = min(least, some[0][0])
-            best[name] = some
+        # what may come through the first rung is sharpened
+        for name in sorted(rows, key=lambda n: rows[n][0][0])[: self.settings.rungs[1].effects]:
+            sharpened = (self._sharpened(row, extent) for row in rows[name])
+            rows[name] = sorted(sharpened, key=lambda row: row[0])
         found = {
-            name: [self._start(c, a, left) for left, a, c in some] for name, some in best.items()
+            name: [self._start(c, a, left) for left, a, c in some] for name, some in rows.items()
         }
         return found | {e.name: [self._unseen(e)] for e in effects if is_unseen(e)}
 
