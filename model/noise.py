@@ -23,6 +23,7 @@ __all__ = [
     "Tails",
     "about_rest",
     "coarse_noise",
+    "fast_noise",
     "noise_at_rest",
     "noise_of",
     "require_readings",
@@ -38,6 +39,7 @@ LEAD_IN, DIFFERENCES = "lead-in", "second differences"
 NOISE_MARGIN = 1.08
 #: Fewer readings have no second difference to average.
 READINGS_MIN = 4
+_FAST = 0.1  # s: what changes more slowly is no noise of single readings
 _READINGS_A_LINE = 4  # samples for each of the three numbers of a periodic line
 _SLOW = 15.0  # Hz: a slower line may be drift, 1/f noise, or noise that a sensor has averaged
 _SLOWER = 3  # lines of a spectrum at least that are slower than a slow one, and lower
@@ -80,6 +82,21 @@ def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
     """
     left, given = about_rest(time, values)
     return math.sqrt(float(left @ left) / (values.size - given))
+
+
+def fast_noise(time: np.ndarray, values: np.ndarray) -> float:
+    """Return the noise of readings (N,) at rest about their means over a tenth of a second.
+
+    0 where they are too few. It is nearly that of ``noise_at_rest`` unless something moves slowly.
+    """
+    width = max(3, round(_FAST / float(np.median(np.diff(time)))))
+    if values.size < 2 * width:
+        return 0.0
+    means = np.convolve(values, np.full(width, 1.0 / width), "valid")
+    first = (width - 1) // 2
+    left = values[first : first + means.size] - means
+    # a mean contains a share of the reading itself
+    return float(np.std(left)) / math.sqrt(1.0 - 1.0 / width)
 
 
 def about_rest(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, int]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from dearig.model.actuator import Actuator
-from dearig.model.diagnosis.engine import MUCH_LESS, Found, Race
+from dearig.model.diagnosis.engine import Found, Race
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
 from dearig.model.diagnosis.imposed import lateness
@@ -41,9 +41,6 @@ from dearig.model.verdict import (
 __all__ = ["Conclusion", "conclude", "unnamed_of"]
 
 _ITERATIONS = 8  # of the last fits, on every sample
-_NAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
-_TRUSTED_SHARE = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
-_ALIKE = 10.0  # of the criterion: odds of e^5, below which two explanations are not told apart
 
 
 class Conclusion:
@@ -75,7 +72,7 @@ class Conclusion:
             return NOTHING_MISSING if nothing else UNEXPLAINED
         if self.is_small:
             return EXPLAINED
-        return PARTLY_EXPLAINED if self.explained > _NAMED_SHARE else UNEXPLAINED
+        return PARTLY_EXPLAINED if self.explained > self.judge.settings.share else UNEXPLAINED
 
     def with_only(self, members: frozenset[str]) -> Fit:
         """Return the best fit with these members, refitted from one with more where unknown."""
@@ -109,7 +106,7 @@ class Conclusion:
             (other,) = fresh
             family = family_of(other)
             behind = self.judge.gain(fit, best)
-            near = behind < _ALIKE or fit.cost - best.cost < self._form()
+            near = behind < self.judge.settings.alike or fit.cost - best.cost < self._form()
             if family != family_of(member) and near and behind < taken.get(family, (math.inf,))[0]:
                 taken[family] = (behind, other, fit)
         return [(other, fit) for _, other, fit in sorted(taken.values(), key=lambda t: t[0])]
@@ -141,7 +138,7 @@ class Conclusion:
     @property
     def is_doubtful(self) -> bool:
         """Whether what was found explains too little to predict other recordings by it."""
-        return not self.is_small and self.explained < _TRUSTED_SHARE
+        return not self.is_small and self.explained < self.judge.settings.trusted_share
 
     def for_others(self) -> Actuator | Strip:
         """Return the model that predicts other recordings."""
@@ -160,7 +157,7 @@ class Conclusion:
         if not once:
             return careful.model
         lawful = [f.cost for members, f in self.found.fits.items() if not members & once]
-        if MUCH_LESS * fit.cost > min(lawful, default=math.inf):
+        if fit.cost > self.judge.settings.share * min(lawful, default=math.inf):
             return self.with_only(fit.members - once).model
         kept = tuple(e for e in careful.model.effects if e[0] not in once)
         return replace(careful.model, effects=kept)
@@ -291,7 +288,9 @@ def _label(member: str) -> str:
 def _families(end: Conclusion) -> tuple[tuple[str, float], ...]:
     """Return the probability of each family, largest first; they add up to 1."""
     found = end.judge.probabilities(list(end.found.fits.values()), end.found.sought)
-    if not end.is_small and not (end.found.best.members and end.explained > _TRUSTED_SHARE):
+    if not end.is_small and not (
+        end.found.best.members and end.explained > end.judge.settings.trusted_share
+    ):
         # what no fit explains is of no known family
         left = 1.0 - max(end.explained, 0.0)
         found = {family: p * (1.0 - left) for family, p in found.items()}
@@ -371,7 +370,7 @@ def _round(race: Race, judge: Judge, fitter: Fitter) -> Round:
             verdict = "chosen"
         elif gain > judge.settings.odds:
             behind = judge.gain(fit, best)
-            verdict = "indistinguishable" if behind < _ALIKE else "better"
+            verdict = "indistinguishable" if behind < judge.settings.alike else "better"
         promised = 1.0 - min((race.starts.get(name, math.inf) / race.misfit) ** 2, 1.0)
         candidates.append(
             Candidate(

@@ -17,12 +17,10 @@ from dearig.model.effects import EFFECTS, Effect
 from dearig.model.environment import recorded_of
 from dearig.model.records import ActuatorRecord
 
-__all__ = ["MUCH_LESS", "Found", "Race", "Search"]
+__all__ = ["Found", "Race", "Search"]
 
 _BASELINE_PART = 0.1  # of the progress
 _DRIFT_TURNS = 3  # of fitting the model and the drift's variance in turn
-#: Ratio of costs from which drift is believed before laws.
-MUCH_LESS = 2.0
 
 Progress = Callable[[str, float], None]
 
@@ -166,7 +164,7 @@ class Search:
         judge.see([baseline, *first, *([drifting] if drifting else [])])
         if drifting is None or judge.gain(baseline, drifting) < self.settings.odds:
             return self._grown(baseline, first)
-        if MUCH_LESS * drifting.cost < first[0].cost:
+        if drifting.cost < self.settings.share * first[0].cost:
             beside = self._grown(drifting, None)
             if judge.is_settled(beside):
                 return beside

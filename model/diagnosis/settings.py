@@ -65,8 +65,15 @@ class DiagnosisSettings:
         Part of what is explained (mean square) that the wrong form of a law may leave: no further
         effect is sought in it once the rest is within the noise.
     share
-        Part of what is above the noise that a further effect must explain: the wrong form of the
-        first one leaves structure that any other effect explains to some part.
+        The better part. Of what is above the noise a further effect must explain it: the wrong form
+        of the first one leaves structure that any other effect explains to some part. What explains
+        less of it in all names nothing, and drift is believed before laws where it leaves less than
+        this part of what they leave.
+    trusted_share
+        Part of what is above the noise that a model must explain to predict other recordings: what
+        explains less may be a disguise.
+    alike
+        Gain of the criterion, odds of e^5, below which two explanations are not told apart.
     noise_margin
         RMS over noise up to which a residual counts as noise.
     white_correlation
@@ -96,6 +103,8 @@ class DiagnosisSettings:
     form_error: float = 0.01
     form_share: float = 0.02
     share: float = 0.5
+    trusted_share: float = 0.8
+    alike: float = 10.0
     noise_margin: float = NOISE_MARGIN
     white_correlation: float = 1.3
     drift_modes: int = 24

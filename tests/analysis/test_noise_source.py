@@ -31,16 +31,19 @@ def recorded(
     travel: float = 1e-4,
     step: float = 0.0,
     at: float = 0.0,
+    swing: float = 0.0,
 ) -> Recording:
     """A slow rise of the voltage after ``rest`` s at 0 V, read at 100 Hz.
 
-    ``travel`` m at 10 kV are read from a rest ``at`` m in steps of ``step`` m.
+    ``travel`` m at 10 kV are read from a rest ``at`` m in steps of ``step`` m. The load swings
+    by ``swing`` m.
     """
     time = np.arange(400) / 100.0
     volts = np.where(time < rest, 0.0, 2000.0 * (time - rest) + 1.0)
     read = travel * (volts / 1e4) ** 2 + NOISE * np.random.default_rng(3).standard_normal(time.size)
     if dropout:
         read[20:22] += 3e-3
+    read = read + swing * np.sin(2.0 * np.pi * 1.7 * time)
     if step:
         read = step * np.round((read + at) / step)
     path, out = folder / "in.csv", folder / "run.h5"
@@ -89,6 +92,16 @@ def test_coarse_readings_tell_neither_noise_nor_zero_at_rest(tmp_path: Path, at:
     row, sentences = dict(describe_rows(run))["noise floor"], noise_sentences([run])
     assert "in steps larger than their noise" in row
     assert "the zero of displacement is known to a part of a step only" in sentences[0]
+
+
+def test_what_moves_slowly_at_rest_is_said(tmp_path: Path) -> None:
+    still = recorded(tmp_path, 2.0)
+    assert noise_sentences([still]) == []
+    swinging = recorded(tmp_path, 2.0, swing=6.0 * NOISE)
+    (sentence,) = noise_sentences([swinging])
+    # a swing of 12 um is 8.5 um RMS
+    assert "the readings at rest move slowly, by 8." in sentence
+    assert "beside a noise of 2." in sentence
 
 
 def test_readings_that_are_not_used_are_not_in_the_noise(tmp_path: Path) -> None:
