@@ -37,6 +37,8 @@ class ActuatorRecord:
     is counted from there. Each reading is the mean of ``means_of`` that were taken, evenly about
     its time. ``coarse_drive``, where there is one, is the drive in fewer and longer steps
     (``dearig.model.fitting.coarse_drive``); the effect of a parameter is estimated with it.
+    ``rounding`` m is the part of ``noise`` that is the step of coarse readings: neighbours are
+    rounded alike, so that their mean keeps it.
     """
 
     name: str
@@ -49,6 +51,7 @@ class ActuatorRecord:
     means_of: int = 1
     lag_error: float = 0.0
     coarse_drive: Drive | None = None
+    rounding: float = 0.0
 
     def __post_init__(self) -> None:
         _check(self.name, self.measured, self.drive.time, self.noise)
@@ -72,6 +75,10 @@ class ActuatorRecord:
         step = float(np.median(np.diff(self.time)))
         # steps of a clock are equal only within rounding: 4.9999999 samples are 5
         return self.in_means(int(1.0 / (rate * step) + 1e-6))
+
+    def _noise_of_means(self, every: int) -> float:
+        kept = min(self.rounding, self.noise)
+        return math.sqrt((self.noise**2 - kept**2) / every + kept**2)
 
     def in_means(self, every: int) -> ActuatorRecord:
         """Return the record in means of ``every`` readings, with less noise.
@@ -101,7 +108,7 @@ class ActuatorRecord:
             self,
             drive=drive,
             displacement=self.displacement[rows].mean(axis=1),
-            noise=self.noise / math.sqrt(every),
+            noise=self._noise_of_means(every),
             valid=valid,
             lead_in=self.lead_in // every,
             means_of=every * self.means_of,

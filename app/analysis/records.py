@@ -152,6 +152,7 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
             valid,
             _lead_in(recording),
             lag_error=recording.displacement_delay_error,
+            rounding=noise.step / math.sqrt(12.0),
         )
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error

@@ -106,6 +106,15 @@ def test_what_coarse_takes_the_mean_of(every):
     assert fine.coarse(200.0).in_means(3).means_of == 15
 
 
+def test_means_of_coarse_readings_keep_their_rounding():
+    fine = record(sigma=2e-6)
+    assert fine.in_means(4).noise == pytest.approx(1e-6)
+    coarse = replace(fine, rounding=1.6e-6)
+    assert coarse.in_means(4).noise == pytest.approx(math.hypot(0.5 * 1.2e-6, 1.6e-6))
+    # the noise that was read may be less than the step alone makes
+    assert replace(fine, rounding=3e-6).in_means(4).noise == pytest.approx(2e-6)
+
+
 @pytest.mark.parametrize("every", [2, 3, 5, 40])
 @pytest.mark.parametrize("turn", [0.2, 0.5, 1.0])
 def test_means_of_a_wave_are_known_from_their_neighbours(every, turn):
