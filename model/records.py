@@ -224,11 +224,11 @@ class FilmRecord:
 Record = ActuatorRecord | FilmRecord
 
 
-def bridged(record: Record, values: np.ndarray) -> np.ndarray:
-    """Return ``values`` (N,) at the samples of ``record``, interpolated across masked readings."""
-    if record.valid is None or not record.valid.any():
+def bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> np.ndarray:
+    """Return ``values`` (N,) with straight lines across what is not ``valid`` (N,)."""
+    if valid is None or not valid.any():
         return values
-    return np.interp(record.time, record.time[record.valid], values[record.valid])
+    return np.where(valid, values, np.interp(time, time[valid], values[valid]))
 
 
 def _check(name: str, values: np.ndarray, time: np.ndarray, noise: float) -> None:

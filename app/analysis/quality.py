@@ -13,6 +13,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, VACUUM_PERMITTIVITY, Film
+from dearig.model.records import bridged
 from dearig.model.spikes import spikes
 from dearig.recording.recording import Recording
 
@@ -104,7 +105,7 @@ def spikes_about(
     """
     if recording.noise is None or recording.noise.step:
         return np.zeros_like(usable), ()
-    left = np.interp(recording.time, recording.time[usable], residual[usable])
+    left = bridged(recording.time, residual, usable)
     found = spikes(recording.time, left, pull, recording.quiet_samples) & usable
     if not found.any():
         return found, ()

@@ -26,7 +26,7 @@ from dearig.model.excitation import Lobes
 from dearig.model.film import Strip
 from dearig.model.measures import errors
 from dearig.model.noise import LEAD_IN, fast_noise, require_readings, rest_of_rounded
-from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
+from dearig.model.records import ActuatorRecord, FilmRecord, Record, bridged, counted
 from dearig.recording.early_end import early_end
 from dearig.recording.layout import SIGNALS
 from dearig.recording.origin import origin_of
@@ -133,13 +133,13 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
             reading_noise_of(recording, None)  # refuses one that never changes
             valid = inspect(recording, drive).valid
             noise = reading_noise_of(recording, valid)
-            stress = _bridged(recording.time, stress, valid)
+            stress = bridged(recording.time, stress, valid)
             return FilmRecord(recording.name, recording.time, stretch, stress, noise.value, valid)
         displacement = _from_rest(recording)
         reading_noise_of(recording, None)
         driven = recording_drive(recording, drive)
         valid = inspect(recording, drive).valid
-        displacement = _bridged(recording.time, displacement, valid)
+        displacement = bridged(recording.time, displacement, valid)
         noise = reading_noise_of(recording, valid)
         if noise.step:
             valid = ~recording.quiet if valid is None else valid & ~recording.quiet
@@ -223,13 +223,6 @@ def _from_rest(recording: Recording) -> np.ndarray:
 def _lead_in(recording: Recording) -> int:
     """Return the samples whose mean is the zero of displacement; 0 if they are too few for it."""
     return recording.quiet_samples if recording.quiet_samples >= MIN_QUIET else 0
-
-
-def _bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> np.ndarray:
-    """``values`` (N,) with a straight line across what is not ``valid``."""
-    if valid is None:
-        return values
-    return np.where(valid, values, np.interp(time, time[valid], values[valid]))
 
 
 def recording_drive(recording: Recording, drive: str) -> Drive:

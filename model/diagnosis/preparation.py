@@ -44,7 +44,7 @@ def prepared(record: Record, model: Actuator | Strip) -> Record:
     thin = _thinned(record, model)
     if isinstance(thin, FilmRecord):
         return thin
-    return replace(thin, displacement=bridged(thin, thin.displacement))
+    return replace(thin, displacement=bridged(thin.time, thin.displacement, thin.valid))
 
 
 def _thinned(record: Record, model: Actuator | Strip) -> Record:
@@ -100,13 +100,13 @@ def without_spikes(record: Record, residual: np.ndarray) -> Record:
     """
     if not isinstance(record, ActuatorRecord) or at_rest(record).size < _QUIET_MIN:
         return record
-    left = bridged(record, residual)
+    left = bridged(record.time, residual, record.valid)
     found = spikes(record.time, left, record.drive.voltage**2, record.lead_in)
     if not found.any():
         return record
     valid = ~found if record.valid is None else record.valid & ~found
     spiky = replace(record, valid=valid)
-    change = np.where(found, bridged(spiky, left) - left, 0.0)
+    change = np.where(found, bridged(record.time, left, valid) - left, 0.0)
     return replace(spiky, displacement=record.displacement + change)
 
 

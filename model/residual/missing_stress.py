@@ -70,7 +70,7 @@ def _of_film(record: FilmRecord, model: Strip) -> MissingStress | None:
     return MissingStress(
         record=record.name,
         time=record.time,
-        stress=bridged(record, record.stress - answer.stress),
+        stress=bridged(record.time, record.stress - answer.stress, record.valid),
         stretch=record.stretch,
         rate=np.gradient(record.stretch, record.time),
         voltage=np.zeros_like(record.time),
@@ -102,7 +102,7 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
         network = c[HEAD + MODULUS :: WIDTH] @ parts
         return network + c[INERTIA] * bend, stretch, rate
 
-    residual = bridged(record, record.displacement - record.seen(response.displacement))
+    residual = bridged(time, record.displacement - record.seen(response.displacement), record.valid)
     measured, stretch, rate = lacking(response.displacement + residual)
     predicted, there, _ = lacking(response.displacement)
     late = np.interp(time - record.lag, time, record.drive.voltage)
