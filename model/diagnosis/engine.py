@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -296,7 +297,7 @@ class Search:
         starts = regression.starts(effects, extent)
         fits = self._run(parent, starts)
         if fits and not self.judge.is_noise(fits[0]):
-            fits = self._with_general(parent, regression, extent, fits)
+            fits = self._with_general(parent, regression, extent, fits, starts)
         self.races.append(
             Race(
                 parent,
@@ -308,16 +309,28 @@ class Search:
         return fits
 
     def _with_general(
-        self, parent: Fit, regression: Regression, extent: Extent, fits: list[Fit]
+        self,
+        parent: Fit,
+        regression: Regression,
+        extent: Extent,
+        fits: list[Fit],
+        starts: Mapping[str, list[Start]],
     ) -> list[Fit]:
-        """Return ``fits``, and those of the general laws of their families.
+        """Return ``fits``, and those of general laws.
 
-        The laws with a name have been fitted; where the best leaves more than noise, its family may
-        have another form.
+        The laws with a name have been fitted from their ``starts``; where the best leaves more than
+        noise, its family may have another form. So may a family of which the regression leaves less
+        by its general law than by any law with a name.
         """
         families = {family_of(name) for fit in fits for name in fit.members - parent.members}
-        laws = [e for e in self.general if e.family in families and e.name not in parent.effects]
-        return self.judge.ranked([*fits, *self._run(parent, regression.starts(laws, extent))])
+        least = min((some[0].misfit for some in starts.values()), default=math.inf)
+        laws = [e for e in self.general if e.name not in parent.effects]
+        racing = {
+            name: some
+            for name, some in regression.starts(laws, extent).items()
+            if EFFECTS[name].family in families or some[0].misfit < least
+        }
+        return self.judge.ranked([*fits, *self._run(parent, racing)])
 
     def _run(self, parent: Fit, starts: Mapping[str, list[Start]]) -> list[Fit]:
         """Return the fits that came through one race, and keep them: the next may be the last."""

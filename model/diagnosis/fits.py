@@ -317,7 +317,10 @@ class Fitter:
         """
         held = np.array(
             [
-                q.kind == "effect" and EFFECTS[q.effect].is_general and q.parameter.neutral is None
+                q.kind == "effect"
+                and EFFECTS[q.effect].is_general
+                and q.parameter.neutral is None
+                and q.parameter.name not in EFFECTS[q.effect].fitted_shapes
                 for q in layout.quantities
             ]
         )

@@ -148,6 +148,9 @@ class Effect:
     is_general
         The effect is the general law of its family: linear in its amplitudes, non-negative weights
         on a fixed grid of shapes, with a ``curve``.
+    fitted_shapes
+        Names of shape parameters of a general law that fits move: the others place its grid, and
+        are held.
     curve
         For a general law: a function of the parameters' values by name that returns the ``Curve``
         that they describe.
@@ -173,6 +176,7 @@ class Effect:
     is_viscoelastic: bool = False
     generalises: str = ""
     is_general: bool = False
+    fitted_shapes: tuple[str, ...] = ()
     curve: Callable[[Mapping[str, float]], Curve] | None = None
     drift_basis: Callable[[np.ndarray], np.ndarray] | None = None
     needs: str = ""

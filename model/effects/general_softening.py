@@ -3,12 +3,14 @@
 With steps B_i (``model.splines``), e the change of stretch from rest and e_max its largest value so
 far, which heals (falls towards e) with a time, the network carries
 
-    1 - sum_i d_i B_i(e_max) - e_max/(e_max + e_0) sum_i r_i B_i((e_max - e)/(e_max + e_0))
+    1 - sum_i d_i B_i(e_max) - e_max/(e_max + e_0) sum_i r_i B_i(p)
+    p = (e_max - e)/(e_max + w) (R + w)/R
 
-of its stress: damage d that stays, as on first loading (even knots up to the reach), and a loss r
-that is regained on the way back to the largest stretch (Ogden and Roxburgh, Proc. R. Soc. A 455,
-1999), which depends on how far below it the film is. The stretch e_0 = 0.001 keeps a film that
-was never stretched from softening by small vibrations.
+of its stress: damage d that stays, as on first loading (even knots up to the reach R), and a loss r
+that is regained on the way back to the largest stretch. A wide w makes it depend on how far below
+that the film is (Ogden and Roxburgh, Proc. R. Soc. A 455, 1999), a narrow one on the part of the
+way; between them is their form with a width that grows with the largest stretch. The stretch
+e_0 = 0.001 keeps a film that was never stretched from softening by small vibrations.
 """
 
 from __future__ import annotations
@@ -67,6 +69,15 @@ EFFECT = Effect(
             logarithmic=True,
         ),
         Parameter(
+            "width",
+            "",
+            (1e-3, 1.0),
+            "change of stretch from which on the loss depends on the part of the way back",
+            1e-3,
+            starts=(1e-3, 1.0),
+            logarithmic=True,
+        ),
+        Parameter(
             "healing_time",
             "s",
             (1.0, 1e5),
@@ -80,25 +91,27 @@ EFFECT = Effect(
     is_hysteretic=True,
     drives=("voltage", "stretch"),
     is_general=True,
+    fitted_shapes=("width", "healing_time"),
     curve=_loss,
 )
 
 
 @jit
 def _largest(c, k, before, now, since):
-    left = math.exp(-since / c[k + _STEPS + _PARTS + 1])
+    left = math.exp(-since / c[k + _STEPS + _PARTS + 2])
     return now + max(before - now, 0.0) * left
 
 
 @jit
 def soften(c, k, m, j, lam, since, t, warmth):
     now = abs(lam - c[REST])
-    most, spacing, lost = _largest(c, k, m[j], now, since), c[k + _STEPS + _PARTS] / _STEPS, 0.0
+    reach, width = c[k + _STEPS + _PARTS], c[k + _STEPS + _PARTS + 1]
+    most, spacing, lost = _largest(c, k, m[j], now, since), reach / _STEPS, 0.0
     for i in range(_STEPS):
         if c[k + i] > 0.0:
             left = i * spacing
             lost += c[k + i] * step(most, left, left + spacing, left + 2.0 * spacing)
-    part, wide = (most - now) / (most + _TREMOR), 1.0 / (_PARTS - 1)
+    part, wide = (most - now) / (most + width) * (1.0 + width / reach), 1.0 / (_PARTS - 1)
     begun = most / (most + _TREMOR)
     for i in range(_PARTS):
         if c[k + _STEPS + i] > 0.0:

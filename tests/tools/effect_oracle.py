@@ -269,7 +269,8 @@ def extra(name, p, film, drive):
         def soften(t, lam, u, z, v, lam0):
             now = abs(lam - rest)
             most = max(z[0], now)
-            way_back = curve_of((most - now) / (most + 1e-3), regained, parts)
+            share = (most - now) / (most + p["width"])
+            way_back = curve_of(share * (1.0 + p["width"] / p["reach"]), regained, parts)
             return 1.0 - curve_of(most, damage, hats) - way_back * most / (most + 1e-3)
 
         return Extra(
