@@ -23,12 +23,12 @@ __all__ = [
     "Tails",
     "about_rest",
     "coarse_noise",
-    "fast_noise",
     "noise_at_rest",
     "noise_of",
     "require_readings",
     "rest_of_rounded",
     "rounding",
+    "slow_at_rest",
     "tails_of",
 ]
 
@@ -40,6 +40,9 @@ NOISE_MARGIN = 1.08
 #: Fewer readings have no second difference to average.
 READINGS_MIN = 4
 _FAST = 0.1  # s: what changes more slowly is no noise of single readings
+#: Noise at rest over that about means of a tenth of a second: three quarters of its power are slow.
+#: With 1/f noise as large as white noise it is 1.2.
+_MOVES = 2.0
 _READINGS_A_LINE = 4  # samples for each of the three numbers of a periodic line
 _SLOW = 15.0  # Hz: a slower line may be drift, 1/f noise, or noise that a sensor has averaged
 _SLOWER = 3  # lines of a spectrum at least that are slower than a slow one, and lower
@@ -84,10 +87,11 @@ def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
     return math.sqrt(float(left @ left) / (values.size - given))
 
 
-def fast_noise(time: np.ndarray, values: np.ndarray) -> float:
-    """Return the noise of readings (N,) at rest about their means over a tenth of a second.
+def slow_at_rest(time: np.ndarray, values: np.ndarray, noise: float) -> float:
+    """Return the RMS of what moves slowly in readings (N,) at rest; 0 unless it is most of them.
 
-    0 where they are too few. It is nearly that of ``noise_at_rest`` unless something moves slowly.
+    Their ``noise`` is that of ``noise_at_rest``. Compared is their noise about means over a tenth
+    of a second, which nothing slow enters.
     """
     width = max(3, round(_FAST / float(np.median(np.diff(time)))))
     if values.size < 2 * width:
@@ -96,7 +100,8 @@ def fast_noise(time: np.ndarray, values: np.ndarray) -> float:
     first = (width - 1) // 2
     left = values[first : first + means.size] - means
     # a mean contains a share of the reading itself
-    return float(np.std(left)) / math.sqrt(1.0 - 1.0 / width)
+    fast = float(np.std(left)) / math.sqrt(1.0 - 1.0 / width)
+    return math.sqrt(noise**2 - fast**2) if noise > _MOVES * fast > 0.0 else 0.0
 
 
 def about_rest(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, int]:

@@ -39,8 +39,9 @@ class Judgement:
 
     ``reasons`` are of: ``training`` (the error of a training recording is above its noise),
     ``selection`` (the cross-validation error rises with what was added), ``validation`` (the error
-    of a validation recording is above its noise) and ``stopped`` (nothing is missing so far, but
-    not everything was tried).
+    of a validation recording is above its noise), ``rest`` (nothing was found, but the readings at
+    rest move slowly, and count as noise) and ``stopped`` (nothing is missing so far, but not
+    everything was tried).
     """
 
     verdict: str
@@ -53,6 +54,7 @@ def judge(
     training: Sequence[float],
     validation: Sequence[float],
     selection: tuple[float, float],
+    moves_at_rest: bool = False,
 ) -> Judgement:
     """Return the verdict that the numbers support, which is never more than ``found``.
 
@@ -60,7 +62,8 @@ def judge(
     how the search ended. ``training`` and ``validation`` are the errors over the noise with the
     final model, one for each recording, without the recording's own drift and events where these
     are known; infinite where the model cannot follow the recording. ``selection`` is the
-    cross-validation error over the noise, with the baseline and with the final model.
+    cross-validation error over the noise, with the baseline and with the final model. With
+    ``moves_at_rest`` the noise at rest of a training recording is mostly slow motion.
     """
     if found not in (NOTHING_MISSING, EXPLAINED):
         return Judgement(found)
@@ -69,6 +72,7 @@ def judge(
         "training": any(error > TOLERANCE for error in training),
         "selection": found == EXPLAINED and after > before and after > TOLERANCE,
         "validation": any(error > TOLERANCE for error in validation),
+        "rest": found == NOTHING_MISSING and moves_at_rest,
         "stopped": found == NOTHING_MISSING and status == STOPPED,
     }
     reasons = tuple(name for name, doubtful in doubts.items() if doubtful)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from dearig.errors import DearigError
-from dearig.model.noise import LEAD_IN
+from dearig.model.noise import LEAD_IN, slow_at_rest
 from dearig.model.verdict import NOTHING_MISSING, STOPPED, Judgement, judge
 
 if TYPE_CHECKING:
@@ -105,6 +105,15 @@ class Comparison:
     def marked(self, name: str) -> str:
         """Return another ``name`` of the recording with the same mark."""
         return name if self.ended is None else f"{name} ({self.ended.mark})"
+
+    @property
+    def moves_at_rest(self) -> bool:
+        """Whether the readings at rest are more of a slow motion than of noise."""
+        if self.kind == "film" or self.noise is None or not self.quiet_count:
+            return False
+        time, rest = self.time[: self.quiet_count], self.measured[: self.quiet_count]
+        good = np.isfinite(rest)
+        return slow_at_rest(time[good], rest[good], self.noise) > 0.0
 
     @property
     def steady_rms(self) -> float:
@@ -310,6 +319,7 @@ class DiagnoseOutcome:
             [s.rms / s.noise for s in finding.after],
             [*untouched, *(math.inf for _ in self.not_compared)],
             (finding.baseline.selection_rms / noise, finding.final.selection_rms / noise),
+            any(c.moves_at_rest for c in self.after.train),
         )
 
     @property

@@ -25,7 +25,7 @@ from dearig.model.errors import ModelError
 from dearig.model.excitation import Lobes
 from dearig.model.film import Strip
 from dearig.model.measures import errors
-from dearig.model.noise import LEAD_IN, fast_noise, require_readings, rest_of_rounded
+from dearig.model.noise import LEAD_IN, require_readings, rest_of_rounded, slow_at_rest
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, bridged, counted
 from dearig.recording.early_end import early_end
 from dearig.recording.layout import SIGNALS
@@ -158,11 +158,6 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
         raise InputError(f"{recording.path}: {error}") from error
 
 
-#: Noise at rest over that about means of a tenth of a second: three quarters of its power are slow.
-#: With 1/f noise as large as white noise it is 1.2.
-_MOVES = 2.0
-
-
 def reading_noise_of(recording: Recording, valid: np.ndarray | None) -> ReadingNoise:
     """Return the noise of the ``valid`` (N,) readings, from the lead-in where there is one.
 
@@ -190,9 +185,10 @@ def noise_sentences(recordings: Iterable[Recording]) -> list[str]:
             continue
         if noise.source == LEAD_IN:
             at_rest = slice(0, recording.quiet_samples)
-            fast = fast_noise(recording.time[at_rest], _present(recording.displacement)[at_rest])
-            if noise.value > _MOVES * fast > 0.0:
-                slow = math.sqrt(noise.value**2 - fast**2)
+            readings = _present(recording.displacement)[at_rest]
+            slow = slow_at_rest(recording.time[at_rest], readings, noise.value)
+            if slow:
+                fast = math.sqrt(noise.value**2 - slow**2)
                 said.append(
                     f"{recording.name}: the readings at rest move slowly, by {slow * 1e6:.3g} um "
                     f"RMS beside a noise of {fast * 1e6:.3g} um: both count as noise, which hides "

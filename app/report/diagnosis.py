@@ -51,6 +51,7 @@ _LOWERED = {
     "validation": "Training recordings explained, validation recordings not",
     "selection": "Residual partly explained: the cross-validation error rises",
     "training": "Residual partly explained: one training recording keeps more than noise",
+    "rest": "Nothing found, but the readings at rest move by more than their noise",
     "stopped": "No missing effect found so far: not every effect was tried",
 }
 
@@ -207,6 +208,12 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
             if s.rms / s.noise > TOLERANCE
         ]
         yield f"Not every training recording is explained: {listed(left)}."
+    if "rest" in reasons:
+        moving = listed([c.name for c in outcome.after.train if c.moves_at_rest])
+        yield (
+            f"The readings of {moving} move slowly before the voltage. What moves there counts as "
+            f"noise, and was not found; effects that are smaller are hidden by it."
+        )
 
 
 def _verdict(outcome: DiagnoseOutcome) -> str:

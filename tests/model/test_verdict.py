@@ -61,3 +61,10 @@ def test_a_search_that_was_stopped_never_says_that_nothing_is_missing(validation
 @pytest.mark.parametrize("found", [PARTLY_EXPLAINED, UNEXPLAINED])
 def test_what_the_search_did_not_explain_no_number_explains(found):
     assert judge(found, COMPLETE, [1.0], [1.0], BETTER) == Judgement(found)
+
+
+def test_nothing_is_not_missing_where_the_readings_move_at_rest():
+    told = judge(NOTHING_MISSING, COMPLETE, [1.0], [1.0], BETTER, True)
+    assert told == Judgement(PARTLY_EXPLAINED, ("rest",))
+    # what was found may be what moves
+    assert judge(EXPLAINED, COMPLETE, [1.0], [1.0], BETTER, True) == Judgement(EXPLAINED)

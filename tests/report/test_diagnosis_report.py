@@ -215,6 +215,19 @@ class TestHeadline:
         found = replace(left("explained", 2.7, steps=(SURE,)), prediction_errors=(9.0, 9.0))
         assert found.verdict == "partly_explained"
 
+    def test_what_moves_before_the_voltage_is_not_called_nothing(self):
+        still = left("nothing_missing", 1.0, steps=())
+        assert still.verdict == "nothing_missing"
+        (train,) = still.after.train
+        swing = 8.0 * NOISE * np.sin(2.0 * np.pi * 1.5 * train.time[:100])
+        measured = train.measured.copy()
+        measured[:100] = swing + NOISE * np.random.default_rng(1).standard_normal(100)
+        moving = replace(train, measured=measured, noise=6.0 * NOISE, quiet_count=100)
+        outcome = replace(still, stands=(replace(still.after, train=(moving,)),))
+        assert diagnosis_json(outcome)["verdict_reasons"] == ["rest"]
+        assert headline(outcome).startswith("Nothing found, but the readings at rest move")
+        assert "move slowly before the voltage" in " ".join(summary(outcome))
+
     def test_a_recording_that_the_model_cannot_follow_is_not_explained(self):
         outcome = diagnose_outcome(not_compared=("fast",))
         assert outcome.verdict == "partly_explained"
