@@ -11,20 +11,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.noise import Tails, about_rest, rounding, tails_of
 
-__all__ = ["spikes"]
+__all__ = ["RINGING", "spikes"]
 
 #: Good readings of a recording that are masked by mistake, on average, where the noise is that at
 #: rest.
 _MASKED_WRONGLY = 0.01
 _REST_MIN = 100  # readings: fewer give the noise to worse than 7 %
 _FEW = 0.01  # of the readings: where more are far off, the noise is not that at rest
-_RINGING = 6  # samples: two periods of ringing at a third of the rate, which no cubic shows
+#: Samples: two periods of ringing at a third of the rate, which no cubic shows.
+RINGING = 6
 _CUT = 0.962  # standard deviation of a normal distribution without its largest hundredth
 #: Displacement over that in proportion to the pull: a film that rings goes twice as far, and one
 #: that is stretched is twice as soft as on average.
@@ -70,7 +72,9 @@ def spikes(time: np.ndarray, signal: np.ndarray, pull: np.ndarray, quiet: int) -
     alone = [_beside(signal, i) < width and not _rings(off, i) for i in map(int, far)]
     found[far[alone]] = True
     farthest = _CLEAR * tails.limit(_MASKED_WRONGLY / signal.size)
-    for i, j in _near_each_other(far, found):
+    # a spike bends the curves of its neighbours: more than these are no spikes, but a misfit
+    few = far.size <= _OFF.size * _FEW * signal.size
+    for i, j in _near_each_other(far, found) if few else ():
         if _are_two(signal, i, j, farthest, tails.step, width):
             found[[i, j]] = True
     return found if np.mean(found) <= _FEW else np.zeros_like(found)
@@ -95,17 +99,30 @@ def _are_two(
     first, last = i - _REACH, j + _REACH + 1
     if first < 0 or last > signal.size:
         return False
-    at = np.arange(first, last)
-    good = (at != i) & (at != j)
-    curves = np.vander((at - 0.5 * (i + j)) / _REACH, 4, increasing=True)
-    fit = np.linalg.pinv(curves[good])
-    left = signal[first:last] - curves @ (fit @ signal[first:last][good])
-    most = scipy.stats.chi2.ppf(_SURE, np.count_nonzero(good) - 4)
+    good, off, error, most = _without_two(j - i)
+    left = off @ signal[first:last]
     if float(np.sum(left[good] ** 2)) > most * width**2:
         return False
-    # the curve at a spike has an error of its own
-    error = np.sqrt(1.0 + np.sum((curves[~good] @ fit) ** 2, axis=1))
     return bool(np.all(np.abs(left[~good]) > farthest * error + step))
+
+
+@cache
+def _without_two(apart: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Return what tells two spikes so many samples ``apart`` from a cubic through the others.
+
+    These are which readings (M,) are others; the matrix (M, M) that subtracts the cubic; the noise
+    (2,) of what it leaves at the spikes, of which the cubic has a part, over that of one reading;
+    and the quantile of the sum of the others' squares.
+    """
+    at = np.arange(-_REACH, apart + _REACH + 1)
+    good = (at != 0) & (at != apart)
+    curves = np.vander((at - 0.5 * apart) / _REACH, 4, increasing=True)
+    fit = np.linalg.pinv(curves[good])
+    off = np.eye(at.size)
+    off[:, good] -= curves @ fit
+    error = np.sqrt(1.0 + np.sum((curves[~good] @ fit) ** 2, axis=1))
+    most = scipy.special.chdtri(np.count_nonzero(good) - 4, 1.0 - _SURE)
+    return good, off, error, float(most)
 
 
 def _at_rest(time: np.ndarray, signal: np.ndarray) -> Tails:
@@ -137,5 +154,5 @@ def _rings(off: np.ndarray, i: int) -> bool:
 
     Not its next two neighbours on either side, whose curves pass through it.
     """
-    others = np.concatenate([off[max(i - _RINGING, 0) : i - 2], off[i + 3 : i + 1 + _RINGING]])
+    others = np.concatenate([off[max(i - RINGING, 0) : i - 2], off[i + 3 : i + 1 + RINGING]])
     return bool(np.max(others) > 0.5 * off[i])

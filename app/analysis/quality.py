@@ -14,7 +14,7 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, VACUUM_PERMITTIVITY, Film
 from dearig.model.records import bridged
-from dearig.model.spikes import spikes
+from dearig.model.spikes import RINGING, spikes
 from dearig.recording.recording import Recording
 
 __all__ = [
@@ -34,7 +34,6 @@ _SAMPLES_MIN = 20
 _MODULUS = 1e5
 _DRIVE_RATIO = 1.05  # of the largest drive to that of the training data: extrapolation from here
 _DURATION_RATIO = 3.0  # the same for the duration
-_RINGS = 6  # samples: two periods of ringing at a third of the rate
 _MARGIN = 2  # samples on either side of a faulty one that are masked with it
 
 
@@ -456,8 +455,8 @@ def _outliers(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
                     abs(signal[b] - signal[a - 1]),
                     abs(steps[i - 1]),
                     abs(steps[b]),
-                    float(np.median(np.abs(steps[max(i - _RINGS, 0) : i]))),
-                    float(np.median(np.abs(steps[b : b + _RINGS]))),
+                    float(np.median(np.abs(steps[max(i - RINGING, 0) : i]))),
+                    float(np.median(np.abs(steps[b : b + RINGING]))),
                 )
                 still = float(np.ptp(moved[a - 1 : b + 1])) < 0.05 * drive_span
                 if calm < 0.3 * min(abs(steps[i]), abs(back)) and still:

@@ -191,8 +191,8 @@ def noise_sentences(recordings: Iterable[Recording]) -> list[str]:
                 fast = math.sqrt(noise.value**2 - slow**2)
                 said.append(
                     f"{recording.name}: the readings at rest move slowly, by {slow * 1e6:.3g} um "
-                    f"RMS beside a noise of {fast * 1e6:.3g} um: both count as noise, which hides "
-                    f"smaller effects"
+                    f"RMS in addition to a noise of {fast * 1e6:.3g} um: both count as noise, "
+                    f"which hides smaller effects"
                 )
         else:
             said.append(

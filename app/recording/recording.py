@@ -272,9 +272,10 @@ class Recording:
             return None
         quiet, end = min(self.quiet_samples, NOISE_MAX), min(self.samples, NOISE_MAX)
         # only the lead-in is read where it is enough
-        enough = quiet >= MIN_QUIET and not takes_few_values(self.arrays.window(name, 0, quiet))
-        for last in (quiet, end) if enough else (end,):
+        for last in (quiet, end) if quiet >= MIN_QUIET else (end,):
             time, readings = (self.arrays.window(n, 0, last) for n in ("time", name))
+            if last < end and takes_few_values(readings):
+                continue
             usable = None if valid is None else valid[:last]
             found = noise_of_readings(time, readings, quiet, usable)
             if found is not None:

@@ -21,7 +21,7 @@ _STEP = 0.02  # of the voltage squared
 _FLOOR = 1e-4  # of the largest gain: what is less is not inverted
 #: Gain in a dip, over the gain on both sides of it, below which the inverse is bounded. A sensor
 #: that averages over time reads nothing at some frequencies, and an exact inverse rings there. The
-#: value assumes that the error of a model's gain is a tenth of the gain beside the dip.
+#: value assumes that the error of a model's gain is a tenth of the gain next to the dip.
 _DIP = 0.1
 
 

@@ -101,7 +101,7 @@ def test_what_moves_slowly_at_rest_is_said(tmp_path: Path) -> None:
     (sentence,) = noise_sentences([swinging])
     # a swing of 12 um is 8.5 um RMS
     assert "the readings at rest move slowly, by 8." in sentence
-    assert "beside a noise of 2." in sentence
+    assert "in addition to a noise of 2." in sentence
     assert compare(swinging, MODEL, "train").moves_at_rest
     assert not compare(still, MODEL, "train").moves_at_rest
 
