@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rigs import is_simulated
+from dearig.analysis.hold import HoldPlan
 from dearig.drivers.daqmx.watchdog import watchdog_words
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.hold_jobs import answer_words, hold_words
@@ -52,6 +53,7 @@ class RunPage(QWidget):
         self.runner = Runner(session, self)
         self.faults: FaultPlan | None = None  #: faults of the next simulated run
         self.live: Live | None = None
+        self._played_hold: HoldPlan | None = None  # of the run that is shown
         self._runs = 0
         self._segments: tuple[tuple[str, float, float], ...] = ()
         self._last_recording: Path | None = None
@@ -97,6 +99,7 @@ class RunPage(QWidget):
         if self.live is not None:
             self.live.close()
         self.live, self._segments = live, preview.segments
+        self._played_hold = session.hold
         self.display.begin(live, preview, preview.loaded.sequence.name, marks)
         self.result.show_text("")
         self.show_button.hide()
@@ -149,6 +152,7 @@ class RunPage(QWidget):
     def _state_changed(self, state: HighVoltage) -> None:
         if state is HighVoltage.ARMED:
             self.display.show_planned()
+            self._played_hold = None
         self._refresh()
 
     @Slot()
@@ -168,11 +172,10 @@ class RunPage(QWidget):
         self.paced.setVisible(is_simulated(session.address))
         self.blocked.show_text("\n".join(b.sentence for b in session.blocks.values()), "warn")
         self._describe_watchdog()
+        self._describe_hold()
         if running:
             return
         self._describe_plan()
-        held = session.hold
-        self.hold_state.show_text("" if held is None else hold_words(held), "muted")
         self.to_sequence.setVisible(preview is not None and not preview.playable)
 
     def _describe_watchdog(self) -> None:
@@ -186,6 +189,16 @@ class RunPage(QWidget):
         if not (card.watchdog_s or card.i_have_no_watchdog):
             words += "; a run on a real card needs card.i_have_no_watchdog = true in the rig file"
         self.watchdog.show_text(f"Hardware watchdog: {words}", "" if card.watchdog_s else "warn")
+
+    def _describe_hold(self) -> None:
+        """Show the newest answer of the hold that plays or has played, else what is planned."""
+        held, played = self.session.hold, self._played_hold
+        shown = played is not None and (self.runner.running or held is played)
+        answer = self.live.last_answer if shown and self.live is not None else None
+        if answer is not None:
+            self.hold_state.show_text(*answer_words(answer))
+        else:
+            self.hold_state.show_text("" if held is None else hold_words(held), "muted")
 
     def _describe_plan(self) -> None:
         preview = self.session.preview
@@ -222,9 +235,7 @@ class RunPage(QWidget):
             if reason
         ]
         self.overlay_failures.show_text("; ".join(failures), "warn")
-        answer = live.last_answer
-        if answer is not None:
-            self.hold_state.show_text(*answer_words(answer))
+        self._describe_hold()
         seconds, total = now.samples / now.rate, now.total / now.rate
         monitor = now.values.get("monitor", float("nan"))
         self.runner.status.show_reading(Reading(monitor, seconds, total))

@@ -99,6 +99,14 @@ def test_a_hold_is_checked_armed_on_run_watched_and_measured(
     assert early.settled_rms == pytest.approx(outcome.settled_rms, rel=0.3)
     with pytest.raises(InputError, match="before the loop had settled"):
         measure_hold(forecast, path, None, 11.0)
+    # the newest answer stands until another run is armed, or the hold is removed
+    run._refresh()
+    assert "error" in run.hold_state.text()
+    click(qtbot, run.arm_button)
+    qtbot.waitUntil(lambda: "Feedback holds 0.3 mm" in run.hold_state.text(), timeout=_PATIENCE)
+    session.set_notes("Ada", "another film", "")
+    run._update_readouts()
+    assert run.hold_state.text() == ""
 
 
 def test_any_change_of_what_is_played_removes_the_feedback(
