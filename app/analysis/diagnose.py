@@ -89,8 +89,9 @@ def diagnose_recordings(
 ) -> DiagnoseOutcome:
     """Find the effects that the thesis's model of ``train`` lacks.
 
-    The ``validation`` recordings are read last, and play no part in the search. ``progress``
-    receives the fraction of the whole work. ``spring`` and ``branch_spring`` are the strain
+    The ``validation`` recordings are read last: of them the search uses the readings before the
+    voltage alone, which tell the sensor's noise. ``progress`` receives the fraction of the whole
+    work. ``spring`` and ``branch_spring`` are the strain
     energies of the baseline. ``ended_early`` is keep, cut or leave-out: what is done
     with recordings whose runs ended early. A search that is not ``thorough`` ends after about a
     minute. The first ctrl-C ends it and keeps what was found (``finding.interrupted``); the second
@@ -103,7 +104,7 @@ def diagnose_recordings(
     recordings, left_out = choose(open_all(train), ended_early)
     others, also_left_out = choose(open_all(validation), ended_early)
     base, quality = _prepared(recordings, others, settings)
-    finding = _search(recordings, base, settings, progress)
+    finding = _search(recordings, others, base, settings, progress)
     said = (*left_out, *also_left_out, *quality)
     return _outcome(recordings, others, finding, said, settings, "", started, clock)
 
@@ -278,7 +279,7 @@ def _search_and_separate(
     while True:
         recordings, _ = choose(open_all(files), settings.ended_early)
         base, _ = _prepared(recordings, [], settings)
-        finding = _search(recordings, base, settings, recorder.parts.part(2.0))
+        finding = _search(recordings, [], base, settings, recorder.parts.part(2.0))
         if finding.interrupted or len(performed) >= experiments:
             return recordings, finding, performed, None
         noise = _noise(recordings, settings.drive)
@@ -327,13 +328,22 @@ def _prepared(
 
 @for_simulations()
 def _search(
-    recordings: Sequence[Recording], base: Any, settings: _Settings, progress: Progress
+    recordings: Sequence[Recording],
+    others: Sequence[Recording],
+    base: Any,
+    settings: _Settings,
+    progress: Progress,
 ) -> Diagnosis:
-    records = [as_record(r, settings.drive) for r in recordings]
+    records, rest = ([as_record(r, settings.drive) for r in some] for some in (recordings, others))
     try:
         with Interrupts() as interrupts:
             return diagnose(
-                records, base, progress=progress, stop=interrupts.asked, thorough=settings.thorough
+                records,
+                base,
+                progress=progress,
+                stop=interrupts.asked,
+                thorough=settings.thorough,
+                others=rest,
             )
     except ModelError as error:
         raise InputError(f"these recordings cannot be diagnosed: {error}") from error

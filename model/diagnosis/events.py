@@ -74,8 +74,9 @@ def own_of(
     if response.ok:
         bare = without_spikes(record, record.displacement - record.seen(response.displacement))
         record = bare if isinstance(bare, ActuatorRecord) else record
-    fitter = Fitter([record], replace(model, effects=()), settings or DiagnosisSettings(), 1)
-    fitter.read_colour(others)
+    settings = settings or DiagnosisSettings()
+    fitter = Fitter([record], replace(model, effects=()), settings, 1, others=others)
+    fitter.read_colour()
     plain = _as_it_is(fitter.problem(model))
     judge = Judge(fitter.settings, plain)
     nothing = None

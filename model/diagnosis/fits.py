@@ -181,7 +181,8 @@ def with_effect(model: Actuator | Strip, name: str, values: Sequence[float]) -> 
 class Fitter:
     """Training ``records``, ``full`` and as the search uses them, and the fits made to them.
 
-    ``raw`` are the full ones without spikes, noise with heavy tails included.
+    ``raw`` are the full ones without spikes, noise with heavy tails included. The readings at rest
+    of ``others``, records of the same sensor, tell the colour of its noise.
     ``watched`` is called after each population of simulations, from any thread, and may raise to
     end the search.
     """
@@ -193,8 +194,10 @@ class Fitter:
         settings: DiagnosisSettings,
         workers: int = 2,
         watched: Callable[[], None] = lambda: None,
+        others: Sequence[Record] = (),
     ) -> None:
         self.base, self.settings, self.workers = base, settings, workers
+        self.others = tuple(others)
         self._measured = tuple(records)
         self.full = self.raw = tuple(with_model_error(r) for r in records)
         self.records = self._prepared(base)
@@ -265,12 +268,10 @@ class Fitter:
             normal.append(without_tails(whole[-1], residual))
         return tuple(whole), tuple(normal)
 
-    def read_colour(self, others: Sequence[Record] = ()) -> None:
-        """Read the 1/f noise of the records at rest; the noise of later problems has it.
-
-        It is of the sensor: the readings at rest of ``others`` tell it as well.
-        """
-        self._pink_density = pink_density((*self.records, *others), self.settings.odds)
+    def read_colour(self) -> None:
+        """Read the 1/f noise of all records at rest; the noise of later problems has it."""
+        known = (*self.records, *self.others)
+        self._pink_density = pink_density(known, self.settings.odds, self.settings.alike)
         self._space.clear()
 
     def _pink(self, records: Sequence[ActuatorRecord], modes: int) -> list[np.ndarray] | None:

@@ -43,6 +43,7 @@ def diagnose(
     thorough: bool = False,
     settings: DiagnosisSettings | None = None,
     log: Callable[[str], None] = _silent,
+    others: Sequence[Record] = (),
 ) -> Diagnosis:
     """Fit ``base`` to ``records``, find what it lacks, and put that in.
 
@@ -50,6 +51,8 @@ def diagnose(
     when ``stop()`` is True, what was found until then is returned. The search ends after the work
     that the ``settings`` allow unless it is to be ``thorough``: that is counted in simulations, so
     the same records give the same answer on any machine. ``log`` receives a line on each choice.
+    Of ``others``, records of the same sensor, only the readings at rest are used: they tell whether
+    its noise is slow, which one lead-in of 2 s often does not.
     Raises ``ModelError`` for records and models that do not fit together.
     """
     settings = settings or DiagnosisSettings()
@@ -60,7 +63,7 @@ def diagnose(
 
     def searched(given: Sequence[Record], first: float) -> tuple[Found, Search]:
         search = Search(
-            Fitter(given, base, settings, workers),
+            Fitter(given, base, settings, workers, others=others),
             lambda stage, fraction: progress(stage, first + part * fraction),
             stop,
             log,
@@ -105,7 +108,10 @@ def _may_be_held(found: Found, search: Search, as_held: Sequence[Record]) -> boo
         return True
     if best is found.baseline:
         return False
-    fitter = Fitter(as_held, found.baseline.model, search.settings, search.fitter.workers)
+    known = search.fitter
+    fitter = Fitter(
+        as_held, found.baseline.model, search.settings, known.workers, others=known.others
+    )
     fitter.read_noise(found.baseline.model)
     for left_out in (None, *best.effects):
         effects = tuple(e for e in best.model.effects if e[0] != left_out)

@@ -20,6 +20,7 @@ import numpy as np
 from dearig.model.fitting.offsets import centred
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
+from dearig.model.noise import about_rest
 from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["Drift", "DriftSpace", "WhitenedProblem", "drift_basis", "drift_modes", "pink_density"]
@@ -29,7 +30,6 @@ _POWER = 2.0  # of 1/j in a mode's standard deviation: an integrated random walk
 _AMPLITUDES = 10.0 ** np.arange(0.0, 9.0, 0.5)
 _PINK_MAX = 15.0  # Hz: faster, a sensor that averages is not white, and mains may stand out
 _PINK_LINES = 16  # of a spectrum: fewer do not show its slope
-_CLEARLY = 1.0  # of the logarithm of a likelihood: a ratio of e
 #: Frequencies in Hz below which 1/f noise is larger than white noise, among which is chosen.
 _CORNERS = 10.0 ** np.arange(-1.0, 3.01, 0.05)
 
@@ -58,23 +58,26 @@ def drift_basis(record: ActuatorRecord, modes: int) -> np.ndarray:
     return basis if record.valid is None else np.where(record.valid[:, None], basis, 0.0)
 
 
-def pink_density(records: Sequence[Record], odds: float) -> float:
+def pink_density(records: Sequence[Record], odds: float, alike: float) -> float:
     """Return p in m^2 of a density p/f of the readings at rest, 0 where they are white.
 
-    Whittle's likelihood of the lead-ins' periodograms below 15 Hz, of a density w + p/f over one of
-    w; p is believed where twice the logarithm of their ratio is above ``odds``, and where a walk or
-    a drift, of density w + p/f^2, is not clearly more probable. Where the rest does not tell them
-    apart, the search tries a drift beside the 1/f noise.
+    Whittle's likelihood of the lead-ins' periodograms below 15 Hz, less their straight line and
+    what is periodic, of a density w + p/f over one of w. p is believed where twice the logarithm of
+    their ratio is above ``odds``, and where that of a walk or a drift, of density w + p/f^2, over
+    it is below ``alike``. Where the rest does not tell them apart, the search tries a drift beside
+    the 1/f noise.
     """
     frequency: list[np.ndarray] = [np.zeros(0)]
     power: list[np.ndarray] = [np.zeros(0)]
     for record in records:
         if not isinstance(record, ActuatorRecord) or record.lead_in < 2 * _PINK_LINES:
             continue
-        rest = record.displacement[: record.lead_in]
-        step = float(np.median(np.diff(record.time)))
+        time = record.time[: record.lead_in]
+        # the slope of a drift would look like 1/f noise
+        rest, _ = about_rest(time, record.displacement[: record.lead_in])
+        step = float(np.median(np.diff(time)))
         f = np.fft.rfftfreq(rest.size, step)[1:]
-        density = 2.0 * step / rest.size * np.abs(np.fft.rfft(rest - rest.mean())[1:]) ** 2
+        density = 2.0 * step / rest.size * np.abs(np.fft.rfft(rest)[1:]) ** 2
         frequency.append(f[f < _PINK_MAX])
         power.append(density[f < _PINK_MAX])
     f, density = np.concatenate(frequency), np.concatenate(power)
@@ -91,7 +94,7 @@ def pink_density(records: Sequence[Record], odds: float) -> float:
 
     score, found = fitted(1.0)
     gain = 2.0 * (f.size * math.log(float(np.mean(density))) - score)
-    return found if gain > odds and score < fitted(2.0)[0] + _CLEARLY else 0.0
+    return found if gain > odds and 2.0 * (score - fitted(2.0)[0]) < alike else 0.0
 
 
 class DriftSpace:

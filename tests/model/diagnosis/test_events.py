@@ -63,13 +63,13 @@ def test_what_is_slow_is_no_drift_where_no_reading_is_known_to_drift() -> None:
     assert own_of(drifting, PLAIN, may_drift=False) is None
 
 
-def record_in_pink_noise(seed: int, lead_in: int = 400) -> ActuatorRecord:
+def record_in_pink_noise(seed: int, lead_in: int = 400, density: float = 1.5e-13) -> ActuatorRecord:
     """At rest for 4 s, of which the first readings are told to be at rest, then 20 s more."""
     drive = thesis_drive()
     time = np.arange(400 + drive.time.size) / 100.0
     voltage = np.concatenate((np.zeros(400), drive.voltage))
     plain = record_of(PLAIN, Drive(time, voltage, hold=True))
-    pink = pink_noise(np.random.default_rng(seed), time.size, 1.5e-13)
+    pink = pink_noise(np.random.default_rng(seed), time.size, density)
     reading = plain.displacement + pink - pink[:lead_in].mean()
     noise = noise_at_rest(time[:lead_in], reading[:lead_in])
     return replace(plain, displacement=reading, noise=noise, lead_in=lead_in)
@@ -82,7 +82,7 @@ def error_of(record: ActuatorRecord) -> float:
 
 def test_the_slow_part_of_coloured_noise_is_no_error_of_the_model() -> None:
     # 1/f noise goes farther in the whole recording than at rest
-    record = record_in_pink_noise(8)
+    record = record_in_pink_noise(8, density=4e-13)
     own = own_of(record, PLAIN, may_drift=False)
     assert own is not None
     assert (own.events, own.drifts) == ((), False)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 from scipy.stats import multivariate_normal
 
 from dearig.model.actuator import Drive
+from dearig.model.diagnosis.fits import Fitter
+from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.slow_noise import (
     Drift,
@@ -115,13 +119,46 @@ def test_the_density_of_1_over_f_noise_is_read_at_rest() -> None:
     found = []
     for _ in range(40):
         white = 1e-6 * rng.standard_normal(400)
-        assert pink_density([at_rest(white)], 12.0) == 0.0
-        found.append(pink_density([at_rest(0.3 * white + pink_noise(rng, 400, 2e-13))], 12.0))
+        assert pink_density([at_rest(white)], 12.0, 10.0) == 0.0
+        found.append(pink_density([at_rest(0.3 * white + pink_noise(rng, 400, 2e-13))], 12.0, 10.0))
     assert np.median(found) == pytest.approx(2e-13, rel=0.15)
     assert np.mean([p > 0.0 for p in found]) > 0.9
     # a walk is no such noise
     walks = [np.cumsum(3e-7 * rng.standard_normal(400)) for _ in range(20)]
-    assert np.mean([pink_density([at_rest(w)], 12.0) == 0.0 for w in walks]) > 0.9
+    assert np.mean([pink_density([at_rest(w)], 12.0, 10.0) == 0.0 for w in walks]) > 0.9
     # of several records at once it is known better
-    both = pink_density([at_rest(pink_noise(rng, 400, 2e-13)) for _ in range(10)], 12.0)
+    both = pink_density([at_rest(pink_noise(rng, 400, 2e-13)) for _ in range(10)], 12.0, 10.0)
     assert both == pytest.approx(2e-13, rel=0.2)
+
+
+def test_others_tell_the_colour_by_their_readings_at_rest_alone() -> None:
+    rng, thesis = np.random.default_rng(7), thesis_drive()
+    rest = 0.01 * np.arange(200)
+    still = Drive(
+        np.concatenate([rest, 2.0 + thesis.time]),
+        np.concatenate([np.zeros(rest.size), thesis.voltage]),
+    )
+
+    def noisy(density: float) -> ActuatorRecord:
+        record = replace(record_of(PLAIN, still), lead_in=rest.size)
+        slow = pink_noise(rng, record.displacement.size, density) if density else 0.0
+        return replace(record, displacement=record.displacement + slow)
+
+    def amplitudes(*others: ActuatorRecord) -> np.ndarray:
+        fitter = Fitter([record], PLAIN, DiagnosisSettings(), workers=1, others=others)
+        fitter.read_colour()
+        drift = fitter.space().drift(0.0)
+        return np.zeros(1) if drift is None else drift.space.parts(0.0)[0][1]
+
+    record = noisy(0.0)
+    assert amplitudes().max() == 0.0  # white
+    others = [noisy(4e-13) for _ in range(3)]
+    coloured = amplitudes(*others)
+    assert coloured.max() > 1.0
+
+    def elsewhere(other: ActuatorRecord) -> ActuatorRecord:
+        moved = other.displacement.copy()
+        moved[other.lead_in :] = rng.standard_normal(moved.size - other.lead_in)
+        return replace(other, displacement=moved)
+
+    assert amplitudes(*map(elsewhere, others)) == pytest.approx(coloured)
