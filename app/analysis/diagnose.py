@@ -54,7 +54,7 @@ from dearig.errors import (
 )
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis import diagnose
-from dearig.model.diagnosis.events import Own, own_of
+from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
 from dearig.model.fitting.prediction import prediction_error
@@ -465,6 +465,9 @@ def _own(
 ) -> dict[str, Own | None]:
     """Return the events and the drift of each of ``recordings``; None without any, and of films."""
     records = {r.name: as_record(r, drive) for r in recordings}
+    rigs = [r for r in records.values() if isinstance(r, ActuatorRecord)]
+    # of all recordings together: what is slow in each, and begins with its voltage, is a law
+    may_drift = may_drift and isinstance(model, Actuator) and drifts_at_rest(rigs, model)
 
     def of(name: str) -> Own | None:
         record = records[name]

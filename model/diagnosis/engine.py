@@ -196,8 +196,11 @@ class Search:
         return fits[0]
 
     def _drifting(self, parent: Fit) -> Fit | None:
-        """Return ``parent`` with drift in the noise; None where white noise is as probable."""
-        if not self.fitter.of_actuator:
+        """Return ``parent`` with drift in the noise; None where it is not more probable.
+
+        White noise may be as probable, or something slow that begins with the voltage.
+        """
+        if not (self.fitter.of_actuator and self.fitter.drifts_at_rest(parent.plain_residuals())):
             return None
         fit, amplitude = parent, 0.0
         for _ in range(_DRIFT_TURNS):

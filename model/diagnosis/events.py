@@ -24,7 +24,7 @@ from dearig.model.fitting.broyden import descend_broyden
 from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.records import ActuatorRecord, Record
 
-__all__ = ["Event", "Own", "own_of"]
+__all__ = ["Event", "Own", "drifts_at_rest", "own_of"]
 
 _ITERATIONS = 20  # of the fit of one size and one moment
 
@@ -111,6 +111,19 @@ def own_of(
     good = np.isfinite(whole.problem.sigma)
     rms = fitter.full[0].noise * float(np.sqrt(np.mean(error[good] ** 2)))
     return Own(tuple(sorted(events, key=lambda e: e.time)), best.drift > 0.0, rms)
+
+
+def drifts_at_rest(
+    records: Sequence[ActuatorRecord], model: Actuator, settings: DiagnosisSettings | None = None
+) -> bool:
+    """Whether what ``model`` leaves of ``records`` that is slow may be a drift of the readings.
+
+    It is none where it begins with the voltage: then the model lacks a law.
+    """
+    bare = replace(model, effects=())
+    fitter = Fitter(records, bare, settings or DiagnosisSettings(), 1)
+    fitter.read_colour()
+    return fitter.drifts_at_rest(_as_it_is(fitter.problem(model)).plain_residuals())
 
 
 def _as_it_is(problem: WhitenedProblem) -> Fit:

@@ -34,6 +34,7 @@ from dearig.model.fitting.slow_noise import (
     DriftSpace,
     WhitenedProblem,
     drift_basis,
+    late_basis,
     pink_density,
 )
 from dearig.model.records import ActuatorRecord, Record, counted
@@ -243,6 +244,20 @@ class Fitter:
                 [drift_basis(r, modes) for r in rigs], self._pink(rigs, modes)
             )
         return self._space[full]
+
+    def drifts_at_rest(self, residuals: np.ndarray) -> bool:
+        """Whether what is slow in ``residuals`` (N,), in noises, may be a drift of the reading.
+
+        A drift is there before the voltage too. It is none where something slow that begins with
+        the voltage is more probable, by the odds that tell explanations apart.
+        """
+        here, modes = self.space(), self.settings.drift_modes
+        rigs = [r for r in self.records if isinstance(r, ActuatorRecord)]
+        late = DriftSpace([late_basis(r, modes) for r in rigs], self._pink(rigs, modes))
+        at_rest, moving = (
+            space.misfit(space.most_probable(residuals), residuals) for space in (here, late)
+        )
+        return at_rest - moving < self.settings.alike
 
     def read_noise(self, model: Actuator | Strip) -> None:
         """Read the noise at rest; later problems are without spikes, of its tails and its colour.

@@ -23,7 +23,15 @@ from dearig.model.fitting.problem import Problem
 from dearig.model.noise import about_rest
 from dearig.model.records import ActuatorRecord, Record
 
-__all__ = ["Drift", "DriftSpace", "WhitenedProblem", "drift_basis", "drift_modes", "pink_density"]
+__all__ = [
+    "Drift",
+    "DriftSpace",
+    "WhitenedProblem",
+    "drift_basis",
+    "drift_modes",
+    "late_basis",
+    "pink_density",
+]
 
 _POWER = 2.0  # of 1/j in a mode's standard deviation: an integrated random walk
 #: Variances of the slowest mode, in units of the noise, among which the evidence chooses.
@@ -56,6 +64,15 @@ def drift_basis(record: ActuatorRecord, modes: int) -> np.ndarray:
     """Return the modes (N, K) of ``drift_modes`` less what the offset of ``record`` absorbs."""
     basis = centred(record, drift_modes(record, modes))
     return basis if record.valid is None else np.where(record.valid[:, None], basis, 0.0)
+
+
+def late_basis(record: ActuatorRecord, modes: int) -> np.ndarray:
+    """Return the modes (N, K) of ``drift_basis``, of what is slow and begins with the voltage."""
+    late = drift_modes(record, modes)
+    late = late - late[max(record.lead_in - 1, 0)]
+    late[: record.lead_in] = 0.0
+    late = centred(record, late)
+    return late if record.valid is None else np.where(record.valid[:, None], late, 0.0)
 
 
 def pink_density(records: Sequence[Record], odds: float, alike: float) -> float:
@@ -131,24 +148,24 @@ class DriftSpace:
         """Return the noise under a drift; None where it is white."""
         return Drift(self, amplitude) if amplitude or self._pink is not None else None
 
+    def misfit(self, amplitude: float, residuals: np.ndarray) -> float:
+        """Return r'(I + B L B')^-1 r + log det(I + B L B') less r'r, of ``residuals`` (N,) r.
+
+        They are in noises; the smaller, the more probable is a drift of variance ``amplitude``.
+        """
+        total = 0.0
+        for (u, variance), (a, b) in zip(self.parts(amplitude), pairwise(self.edges), strict=True):
+            power = (residuals[a:b] @ u) ** 2
+            total += float(np.sum(np.log1p(variance) - power * variance / (1.0 + variance)))
+        return total
+
     def most_probable(self, residuals: np.ndarray) -> float:
         """Return the variance of the drift under which ``residuals`` (N,) are most probable.
 
-        Maximum of the evidence -r'(I + B L B')^-1 r - log det(I + B L B') over a grid of half
-        decades; 0 where the noise without drift is as probable as any. ``residuals`` are in noises.
+        From a grid of half decades; 0 where the noise without drift is as probable as any.
         """
-
-        def score(amplitude: float) -> float:
-            total = 0.0
-            for (u, variance), (a, b) in zip(
-                self.parts(amplitude), pairwise(self.edges), strict=True
-            ):
-                power = (residuals[a:b] @ u) ** 2
-                total += float(np.sum(np.log1p(variance) - power * variance / (1.0 + variance)))
-            return total
-
-        best = min(map(float, _AMPLITUDES), key=score)
-        return best if score(best) < score(0.0) else 0.0
+        best = min(map(float, _AMPLITUDES), key=lambda a: self.misfit(a, residuals))
+        return best if self.misfit(best, residuals) < self.misfit(0.0, residuals) else 0.0
 
 
 class Drift:

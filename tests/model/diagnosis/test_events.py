@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dearig.model.actuator import Drive
-from dearig.model.diagnosis.events import own_of
+from dearig.model.diagnosis.events import drifts_at_rest, own_of
 from dearig.model.noise import noise_at_rest
-from dearig.model.records import ActuatorRecord
+from dearig.model.records import ActuatorRecord, counted
 from tests.tools.engine import NOISE, PLAIN, effect, pink_noise, record_of, thesis_drive
 
 KINDS = {
@@ -116,3 +116,18 @@ def test_a_film_that_differs_from_the_start_on_has_no_event(part: float) -> None
     assert np.sqrt(np.mean(left**2)) > 1.5 * NOISE
     own = own_of(record, PLAIN)
     assert own is None or own.events == ()
+
+
+def test_a_drift_of_the_reading_is_there_before_the_voltage() -> None:
+    record = replace(record_in_pink_noise(8, density=0.0), lead_in=400)
+    time = record.time
+    begins = time[record.lead_in]
+    # a stand that wanders, and a film that goes on as slowly once it is pulled
+    wanders = 2e-5 * np.sin(0.3 * time + 1.0)
+    creeps = np.where(time > begins, 2e-5 * np.sin(0.3 * (time - begins)), 0.0)
+    here = counted(record.displacement + wanders, record.lead_in)
+    late = record.displacement + creeps
+    assert drifts_at_rest([replace(record, displacement=here)], PLAIN)
+    assert not drifts_at_rest([replace(record, displacement=late)], PLAIN)
+    # without readings at rest nothing speaks against a drift
+    assert drifts_at_rest([replace(record, displacement=late, lead_in=0)], PLAIN)
