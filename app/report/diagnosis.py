@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dearig.analysis.outcomes import pooled_noise, pooled_rms
+from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
 from dearig.model.verdict import TOLERANCE
 from dearig.report.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
 from dearig.report.sentences import few_data_sentence, listed
@@ -275,19 +275,27 @@ def _error_change(
     changed: bool,
 ) -> str:
     shown = SHOWN[outcome.kind]
-    first, last = pooled_rms(before), pooled_rms(after)
+    rms = [pooled_rms(before), pooled_rms(after), pooled_steady_rms(after)]
+    first, last, steady = (significant(error * shown.error_factor) for error in rms)
     # of the same recordings, as in the table
     noise = pooled_noise(after) or outcome.noise
     floor = f"the noise floor of {significant(noise * shown.error_factor)} {shown.error_unit}"
+    times = f"{significant(rms[1] / noise)} times {floor}"
     if not changed:
-        return (
-            f"On {role} the error is {significant(last * shown.error_factor)} "
-            f"{shown.error_unit} RMS, {significant(last / noise)} times {floor}."
+        said = f"On {role} the error is {last} {shown.error_unit} RMS, {times}."
+    elif first == last:
+        said = f"On {role} the error stays {last} {shown.error_unit} RMS, which is {times}."
+    else:
+        verb = "falls" if rms[1] < rms[0] else "rises"
+        said = (
+            f"On {role} the error {verb} from {first} to {last} {shown.error_unit} RMS, which is "
+            f"{times}."
         )
+    if steady == last:
+        return said
     return (
-        f"On {role} the error {'falls' if last < first else 'changes'} from "
-        f"{significant(first * shown.error_factor)} to {significant(last * shown.error_factor)} "
-        f"{shown.error_unit} RMS, which is {significant(last / noise)} times {floor}."
+        f"{said} Without slow noise, drift and events of each recording, which no model predicts, "
+        f"it is {steady} {shown.error_unit} RMS, {significant(rms[2] / noise)} times the noise."
     )
 
 

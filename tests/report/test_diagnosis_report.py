@@ -238,7 +238,21 @@ class TestHeadline:
         jumped, other = outcome.after.validation
         steady = replace(jumped, rms_without_events=1.02 * jumped.noise)
         after = replace(outcome.after, validation=(steady, other))
-        assert replace(outcome, stands=(outcome.before, after)).verdict == "explained"
+        found = replace(outcome, stands=(outcome.before, after))
+        assert found.verdict == "explained"
+        # and the prediction as it is comes first
+        words = " ".join(summary(found))
+        assert "Without slow noise, drift and events of each recording" in words
+        assert "which no model predicts" not in " ".join(summary(outcome))
+
+    def test_an_error_that_does_not_change_is_not_said_to_fall(self):
+        outcome = left("explained", 6.1, steps=(SURE,))
+        same = replace(outcome, stands=(outcome.after, outcome.after))
+        shown = significant(pooled_errors(outcome.after.validation).rms * 1e6)
+        assert f"the error stays {shown}" in " ".join(summary(same))
+        clean = diagnose_outcome()
+        worse = replace(clean, stands=(clean.after, clean.before))
+        assert "the error rises from" in " ".join(summary(worse))
 
     def test_a_rising_cross_validation_error_is_said(self):
         stage = finding().final
