@@ -217,7 +217,7 @@ def test_what_the_readings_at_rest_show_is_fitted_first() -> None:
 
 def test_slow_noise_of_a_sensor_is_noise_and_a_drift_is_a_drift() -> None:
     count = 400 + thesis_drive().time.size
-    pink = pink_noise(np.random.default_rng(8), count, 1.5e-13)
+    pink = pink_noise(np.random.default_rng(8), count, 4e-13)
     assert diagnose([after_rest(pink)], PLAIN, workers=1).verdict == "nothing_missing"
     # at rest, a reading that drifts is not white either
     time = np.arange(count) / 100.0
