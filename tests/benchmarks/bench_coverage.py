@@ -3,10 +3,12 @@
 Run as ``python -m tests.benchmarks.bench_coverage --rigs 100``, with ``--diagnose`` for the other.
 Each rig has a film of three branches and one noise, drawn by its seed; ``--diagnose`` gives it one
 effect of a list beside that, in turn. It makes the thesis's identification record, with a lead-in
-of 2 s, white noise, and the steps of a 16-bit converter; displacement is counted from the mean of
-the lead-in, as in a recording. The truth is inside the model's class: what is counted is whether
-the intervals are honest, not whether the model is right. With each share stands its own 95 %
-interval (Clopper and Pearson), and the RMS of the errors in units of what the interval says.
+of 2 s, white noise, and the steps of a 16-bit converter, which holds the voltage; displacement is
+counted from the mean of the lead-in, as in a recording. With ``--table`` the voltage is straight
+between samples, which the record does not say. The truth is inside the model's class: what is
+counted is whether the intervals are honest, not whether the model is right. With each share stands
+its own 95 % interval (Clopper and Pearson), and the RMS of the errors in units of what the interval
+says.
 """
 
 from __future__ import annotations
@@ -75,9 +77,9 @@ def rig_of(seed: int, effects: EffectValues = ()) -> tuple[Actuator, float]:
     return Actuator(THESIS_FILM, THESIS_LOAD, network, effects), noise
 
 
-def record_of(model: Actuator, noise: float, rate: float, seed: int) -> ActuatorRecord:
+def record_of(model: Actuator, noise: float, rate: float, seed: int, hold: bool) -> ActuatorRecord:
     """Return the thesis's record of ``model`` as a recording gives it to a fit."""
-    drive = Drive(*Sequence.thesis().sample(rate))
+    drive = Drive(*Sequence.thesis().sample(rate), hold=hold)
     answer = model.simulate(drive)
     if not answer.ok:
         raise RuntimeError(f"rig {seed}: {answer.in_words}")
@@ -119,6 +121,9 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="first seed [0]")
     parser.add_argument("--rate", type=float, default=1000.0, help="Hz [1000]")
     parser.add_argument("--diagnose", action="store_true", help="diagnose rigs with one effect")
+    parser.add_argument(
+        "--table", action="store_true", help="do not say that the voltage is held between samples"
+    )
     parser.add_argument("--workers", type=int, default=2, help="threads of a fit [2]")
     given = parser.parse_args()
     counts: dict[str, Count] = {}
@@ -127,7 +132,7 @@ def main() -> None:
         started = time.perf_counter()
         effects = EFFECTS_DRAWN[seed % len(EFFECTS_DRAWN)] if given.diagnose else ()
         model, noise = rig_of(seed, effects)
-        record = record_of(model, noise, given.rate, seed)
+        record = record_of(model, noise, given.rate, seed, not given.table)
         base = replace(model, effects=())
         if given.diagnose:
             finding = diagnose([record], base, workers=given.workers)
