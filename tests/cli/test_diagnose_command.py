@@ -69,7 +69,13 @@ def instead(monkeypatch: pytest.MonkeyPatch, *found: Diagnosis) -> list[int]:
     seen: list[int] = []
 
     def search(
-        records: list, base: Actuator | Strip, *, progress: Callable, stop: Callable, thorough: bool
+        records: list,
+        base: Actuator | Strip,
+        *,
+        progress: Callable,
+        stop: Callable,
+        thorough: bool,
+        others: list,
     ) -> Diagnosis:
         seen.append(len(records))
         progress("search", 0.5)
@@ -202,7 +208,7 @@ class TestOutputs:
         assert "Residual explained; by which effect these data cannot tell" in answer.err
 
     def test_an_interruption_keeps_what_was_found(self, bench, tmp_path, monkeypatch):
-        def search(records, base, *, progress, stop, thorough):
+        def search(records, base, *, progress, stop, thorough, others):
             assert not stop()
             signal.raise_signal(signal.SIGINT)
             assert stop()
@@ -224,7 +230,7 @@ class TestOutputs:
     def test_a_search_is_as_thorough_as_it_is_asked_to_be(self, bench, monkeypatch, words):
         asked = []
 
-        def search(records, base, *, progress, stop, thorough):
+        def search(records, base, *, progress, stop, thorough, others):
             asked.append(thorough)
             return finding()
 
@@ -233,7 +239,7 @@ class TestOutputs:
         assert asked == [bool(words)]
 
     def test_the_second_interruption_ends_at_once(self, bench, tmp_path, monkeypatch):
-        def search(records, base, *, progress, stop, thorough):
+        def search(records, base, *, progress, stop, thorough, others):
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGINT)
             raise AssertionError("it went on")
