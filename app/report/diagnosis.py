@@ -294,8 +294,8 @@ def _error_change(
     if steady == last:
         return said
     return (
-        f"{said} Without slow noise, drift and events of each recording, which no model predicts, "
-        f"it is {steady} {shown.error_unit} RMS, {significant(rms[2] / noise)} times the noise."
+        f"{said} Without slow noise, drift and events of each recording it is "
+        f"{steady} {shown.error_unit} RMS, {significant(rms[2] / noise)} times the noise."
     )
 
 

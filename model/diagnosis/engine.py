@@ -212,7 +212,7 @@ class Search:
                 return None
             problem = self.fitter.problem(fit.model, amplitude)
             fit = self.fitter.refined(self.fitter.descend(problem, fit.x, 10))
-        # asked of springs that are fitted beside the drift: without it, they have bent to it
+        # springs that were fitted without the drift have absorbed a part of it
         if not (amplitude and self.fitter.drifts_at_rest(fit.plain_residuals())):
             return None
         return self.keep(fit)

@@ -48,9 +48,7 @@ def drift_modes(record: ActuatorRecord, modes: int, every: int = 1) -> np.ndarra
     Each is 0 where a reading is masked, and on average over the lead-in. With ``every`` > 1 they
     are means of so many neighbours.
     """
-    time = record.time - record.time[0]
-    number = np.arange(1, modes + 1)
-    basis = np.cos(math.pi * number * (time / time[-1])[:, None]) * number**-_POWER
+    basis = _cosines(record, modes)
     basis -= basis[: max(record.lead_in, 1)].mean(axis=0)
     if record.valid is not None:
         basis[~record.valid] = 0.0
@@ -62,17 +60,29 @@ def drift_modes(record: ActuatorRecord, modes: int, every: int = 1) -> np.ndarra
 
 def drift_basis(record: ActuatorRecord, modes: int) -> np.ndarray:
     """Return the modes (N, K) of ``drift_modes`` less what the offset of ``record`` absorbs."""
-    basis = centred(record, drift_modes(record, modes))
-    return basis if record.valid is None else np.where(record.valid[:, None], basis, 0.0)
+    return _without_offset(record, drift_modes(record, modes))
 
 
 def late_basis(record: ActuatorRecord, modes: int) -> np.ndarray:
     """Return the modes (N, K) of ``drift_basis``, of what is slow and begins with the voltage."""
-    late = drift_modes(record, modes)
-    late = late - late[max(record.lead_in - 1, 0)]
+    late = _cosines(record, modes)
+    late -= late[max(record.lead_in - 1, 0)]
     late[: record.lead_in] = 0.0
-    late = centred(record, late)
-    return late if record.valid is None else np.where(record.valid[:, None], late, 0.0)
+    return _without_offset(record, late)
+
+
+def _cosines(record: ActuatorRecord, modes: int) -> np.ndarray:
+    """Return the modes (N, K) of a drift of unit amplitude at every reading."""
+    time = record.time - record.time[0]
+    number = np.arange(1, modes + 1)
+    return np.asarray(np.cos(math.pi * number * (time / time[-1])[:, None]) * number**-_POWER)
+
+
+def _without_offset(record: ActuatorRecord, modes: np.ndarray) -> np.ndarray:
+    """Return ``modes`` (N, K) less what the offset absorbs, and 0 where a reading is masked."""
+    if record.valid is None:
+        return centred(record, modes)
+    return np.where(record.valid[:, None], centred(record, modes), 0.0)
 
 
 def pink_density(records: Sequence[Record], odds: float, alike: float) -> float:

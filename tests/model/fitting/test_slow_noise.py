@@ -18,6 +18,7 @@ from dearig.model.fitting.slow_noise import (
     DriftSpace,
     WhitenedProblem,
     drift_modes,
+    late_basis,
     pink_density,
 )
 from dearig.model.records import ActuatorRecord
@@ -162,3 +163,15 @@ def test_others_tell_the_colour_by_their_readings_at_rest_alone() -> None:
         return replace(other, displacement=moved)
 
     assert amplitudes(*map(elsewhere, others)) == pytest.approx(coloured)
+
+
+def test_what_begins_with_the_voltage_begins_at_0_whatever_is_masked() -> None:
+    record = replace(at_rest(np.zeros(300)), lead_in=100)
+    late = late_basis(record, 4)
+    assert np.ptp(late[:100], axis=0) == pytest.approx(0.0, abs=1e-12)
+    valid = np.ones(300, dtype=bool)
+    valid[99] = False  # the last reading at rest
+    steps = np.abs(np.diff(late_basis(replace(record, valid=valid), 4)[100:], axis=0))
+    assert steps == pytest.approx(np.abs(np.diff(late[100:], axis=0)))
+    first = late_basis(replace(record, valid=valid), 4)
+    assert np.abs(first[100] - first[98]) == pytest.approx(np.abs(late[100] - late[98]))
