@@ -31,7 +31,8 @@ class Score:
     rig's noise, ``own`` what the validation recordings have each of their own: the way a bench has
     wandered, which the hidden truth itself could not predict. ``probability`` is what the
     diagnosis gives to what is true, ``brier`` the Brier score; ``processor`` are seconds of
-    processors that the command took; all NaN where they are not known.
+    processors that the command took; all NaN where they are not known. ``leading`` is the family
+    of the highest probability, ``leading_probability``.
     """
 
     seed: int
@@ -57,6 +58,13 @@ class Score:
     probability: float = math.nan
     brier: float = math.nan
     processor: float = math.nan
+    leading: str = ""
+    leading_probability: float = math.nan
+
+    @property
+    def leads_right(self) -> bool:
+        """Whether the family that the diagnosis gives the highest probability is hidden."""
+        return self.leading in _truth(self.families)
 
     @property
     def least(self) -> float:
@@ -87,7 +95,7 @@ class Score:
 def score(result: Mapping[str, Any]) -> Score:
     """The score of a kept ``result``."""
     truth, answer = result["truth"], result["diagnosis"]
-    families = tuple(truth["families"])
+    families, said = tuple(truth["families"]), _said(answer)
     kind = kind_of(families)
     nan = float("nan")
     named: tuple[str, ...] = ()
@@ -136,6 +144,8 @@ def score(result: Mapping[str, Any]) -> Score:
         probability=_probability(families, answer),
         brier=_brier(families, answer),
         processor=result.get("processor_s", math.nan),
+        leading=max(said, key=said.__getitem__, default=""),
+        leading_probability=max(said.values(), default=math.nan),
     )
 
 

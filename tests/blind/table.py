@@ -15,7 +15,7 @@ __all__ = ["line", "report"]
 QUICK = 60.0
 #: Share to be named, by mode; of the rest, whatever the mode.
 NAMED = {"thesis": 0.90, "rich": 0.95}
-EXPLAINED, DESCRIBED, FALSE_ALARMS = 0.85, 0.80, 0.02
+EXPLAINED, DESCRIBED, FALSE_ALARMS, SURE = 0.85, 0.80, 0.02, 0.90
 
 _TITLES = {"thesis": "the thesis's record alone", "rich": "the thesis's record and the rich one"}
 _HEAD = (
@@ -98,6 +98,10 @@ def _totals(mode: str, scores: Sequence[Score]) -> str:
     pairs = [s for s in scores if s.kind == "pair"]
     unknown = [s for s in scores if s.kind == UNKNOWN]
     clean = [s for s in scores if s.kind == "clean"]
+    told = [s for s in scores if s.outcome != FAILED]
+    closed = [s for s in told if s.verdict in ("explained", "nothing_missing")]
+    open_ = [s for s in told if s not in closed]
+    sure = [s for s in scores if s.leading_probability >= _SURE]
     rows = [
         _share("named right or in the group", covered, lambda s: s.found, NAMED[mode]),
         _share("within 15 % of the noise", covered, lambda s: s.is_noise, EXPLAINED),
@@ -112,7 +116,13 @@ def _totals(mode: str, scores: Sequence[Score]) -> str:
         _most("false alarms", clean, lambda s: s.outcome != RIGHT, FALSE_ALARMS),
         _most("worse than before", scores, lambda s: s.worse, 0.0),
         _most("something needless named", covered, lambda s: bool(s.needless), None),
+        _share(f"said with {_SURE:g} or more, and true", sure, lambda s: s.leads_right, SURE),
+        _share("explained or nothing_missing, and within 15 %", closed, lambda s: s.is_noise, None),
+        _share("any other verdict, and within 15 %", open_, lambda s: s.is_noise, None),
         _most(f"longer than {QUICK:.0f} s", scores, lambda s: s.seconds > QUICK, 0.0),
+        _most(
+            f"longer than {QUICK:.0f} s of processors", scores, lambda s: s.processor > QUICK, None
+        ),
     ]
     floors = [s.floor_read / s.floor for s in scores if s.outcome != FAILED]
     said = ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -186,6 +187,14 @@ def test_the_totals_are_held_against_what_is_wanted() -> None:
     assert "| longer than 60 s | 1 of 7 | <= 0 | **no** |" in page
 
 
+def test_verdicts_are_held_against_the_errors() -> None:
+    near, far = (score(result(("drag",), step("drag"), after=a * FLOOR)) for a in (1.1, 1.3))
+    closed = [replace(s, verdict="explained") for s in (near, far)]
+    page = report([*closed, replace(far, verdict="partly_explained")])
+    assert "| explained or nothing_missing, and within 15 % | 1 of 2 (50%) |" in page
+    assert "| any other verdict, and within 15 % | 0 of 1 (0%) |" in page
+
+
 def test_what_is_of_one_run_alone_is_nobodys_error() -> None:
     drifting = score(result(("drift",), step("drift"), after=11.0, own=10.0))
     assert drifting.is_noise
@@ -225,6 +234,13 @@ def test_probabilities_are_held_against_what_is_true() -> None:
     assert "The probability given to what is true is 0.90 in the mean" in page
     assert "1 times at least 0.9" in page
     assert "Seconds of processors: median 12.5" in page
+    assert "| said with 0.9 or more, and true | 1 of 1 (100%) | >= 90% | yes |" in page
+    assert "| longer than 60 s of processors | 0 of 1 |" in page
+    sure["diagnosis"]["families"][0]["family"] = "thermal"
+    assert (score(sure).leading, score(sure).leads_right) == ("thermal", False)
+    assert "| said with 0.9 or more, and true | 0 of 1 (0%) | >= 90% | **no** |" in report(
+        [score(sure)]
+    )
     clean = result(())
     clean["diagnosis"]["families"] = [{"family": "none", "probability": 1.0}]
     assert score(clean).brier == 0.0

@@ -63,6 +63,7 @@ MEASUREMENTS = {
         (
             "tests.benchmarks.bench_coverage --rigs 100",
             "tests.benchmarks.bench_coverage --rigs 40 --rate 200 --diagnose",
+            "tests.benchmarks.bench_slow_noise",
         ),
     ),
     "rig": Measurement(
