@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-from dearig.drivers.findings import Finding
+from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.rig import Rig
 from dearig.drivers.settings import RigSettings
 

@@ -2,7 +2,8 @@
 
 A parameter set is one row, so that a population is a matrix. It holds the numbers of the film and
 its load, the values of all effects (neutral unless a model says otherwise), then ``WIDTH`` numbers
-for each spring, the equilibrium spring first. ``dearig.model.network.HEAD`` is where these begin.
+for each spring, the equilibrium spring first. ``dearig.model.film.network.HEAD`` is where these
+begin.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.drivers.settings import AmplifierSettings
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 
 __all__ = ["Amplifier", "AmplifierRows", "AmplifierState"]
 

@@ -10,8 +10,8 @@ import re
 
 from dearig.drivers.errors import AddressError
 from dearig.drivers.settings import RigSettings
-from dearig.model.actuator import Actuator
-from dearig.model.material import TABLE_3, Film, Load
+from dearig.model.film.material import TABLE_3, Film, Load
+from dearig.model.simulation.actuator import Actuator
 from dearig.sim_backend.clock import Clock, ManualClock, PacedClock
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.laser_noise import WHITE

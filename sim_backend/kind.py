@@ -7,25 +7,25 @@ from typing import Literal
 
 import numpy as np
 
-from dearig.drivers.amplifier import Monitors
 from dearig.drivers.channels import Channel
 from dearig.drivers.errors import RigError
-from dearig.drivers.findings import Finding
 from dearig.drivers.gate import Prediction, admit
-from dearig.drivers.instruments import (
+from dearig.drivers.instruments.amplifier import Monitors
+from dearig.drivers.instruments.findings import Finding
+from dearig.drivers.instruments.laser import LaserDriver, LaserInspection
+from dearig.drivers.instruments.registered import (
     INSTRUMENTS,
     instrument_findings,
     reading_findings,
     room_driver,
 )
+from dearig.drivers.instruments.thermohygrometer import ThermohygrometerDriver
+from dearig.drivers.instruments.vaisala import VaisalaDriver
 from dearig.drivers.keyence.driver import KeyenceDriver
-from dearig.drivers.laser import LaserDriver, LaserInspection
 from dearig.drivers.rig import Rig, RigIdentity
 from dearig.drivers.rig_kind import RigOptions
 from dearig.drivers.settings import LaserSettings, RigSettings
-from dearig.drivers.thermohygrometer import ThermohygrometerDriver
-from dearig.drivers.vaisala import VaisalaDriver
-from dearig.model.material import Film
+from dearig.model.film.material import Film
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.keyence import SimulatedController

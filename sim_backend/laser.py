@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.drivers.settings import LaserSettings
-from dearig.model.jit import allocating, jit
+from dearig.model.compiled.jit import allocating, jit
 from dearig.sim_backend.laser_noise import WHITE, LaserNoise
 from dearig.sim_backend.streams import Streams
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import (
+from dearig.model.effects import EFFECTS, SENSOR_MEMORY
+from dearig.model.readings.environment import CELSIUS, HUMIDITY
+from dearig.model.simulation.actuator import (
     NO_AIR,
     STATUS_WORDS,
     Actuator,
@@ -16,8 +18,6 @@ from dearig.model.actuator import (
     ends_of,
     initial_state,
 )
-from dearig.model.effects import EFFECTS, SENSOR_MEMORY
-from dearig.model.environment import CELSIUS, HUMIDITY
 from dearig.sim_backend.plant import Air, Motion
 
 __all__ = ["ModelPlant"]

@@ -15,15 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.drivers.errors import RigError
-from dearig.drivers.instruments import room_driver
-from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
-from dearig.drivers.thermohygrometer import (
+from dearig.drivers.instruments.registered import room_driver
+from dearig.drivers.instruments.thermohygrometer import (
     NO_READING,
     RoomReading,
     ThermohygrometerError,
     aged,
 )
-from dearig.drivers.vaisala import VaisalaDriver
+from dearig.drivers.instruments.vaisala import VaisalaDriver
+from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.serial_line import SimulatedLine
 from dearig.sim_backend.vaisala import SimulatedProbe

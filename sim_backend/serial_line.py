@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from dearig.drivers.serial_line import POLL
+from dearig.drivers.instruments.serial_line import POLL
 
 __all__ = ["Responder", "SimulatedLine"]
 

@@ -1,8 +1,8 @@
 """Vaisala probe on its serial line: bytes in, bytes out, time as an argument.
 
-It knows the commands that ``dearig.drivers.vaisala`` sends, in the STOP mode of a probe of its own
-line, or in POLL mode where the settings have an address. The line is that of a HMP110: temperature,
-relative humidity and dew point with one decimal.
+It knows the commands that ``dearig.drivers.instruments.vaisala`` sends, in the STOP mode of a probe
+of its own line, or in POLL mode where the settings have an address. The line is that of a HMP110:
+temperature, relative humidity and dew point with one decimal.
 """
 
 from __future__ import annotations

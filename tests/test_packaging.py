@@ -141,7 +141,7 @@ from PySide6.QtCore import QUrl
 from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QApplication
 application = QApplication([])
-from dearig.window.guide import Guide
+from dearig.window.shell.guide import Guide
 guide = Guide()
 kind = QTextDocument.ResourceType.ImageResource.value
 names = re.findall('<img src="([^"]+)"', guide.text.document().toHtml())

@@ -17,7 +17,7 @@ from dearig.acquisition.rigs import kind_of, options_of
 from dearig.config.rigfile import RigFile
 from dearig.drivers.daqmx.watchdog import WATCHDOG
 from dearig.drivers.errors import AddressError, LinkRefused
-from dearig.drivers.findings import Finding
+from dearig.drivers.instruments.findings import Finding
 from dearig.errors import InputError, InstrumentFault
 from dearig.sim_backend.faults import FaultPlan
 

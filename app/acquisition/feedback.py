@@ -23,9 +23,9 @@ from dearig.drivers.gate import BlockGate
 from dearig.drivers.interlocks import Trip, laser_reach
 from dearig.drivers.rig import Block, Event
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
 from dearig.model.control import HoldAnswer, HoldController, HoldSettings
 from dearig.model.errors import ModelError
+from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
 
 __all__ = ["Feedback", "FeedbackLoop", "FeedbackReport"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 from dearig.drivers.rig import Event
-from dearig.recording.marks import NOTE_BYTES, mark_message
+from dearig.recording.reading.marks import NOTE_BYTES, mark_message
 
 __all__ = ["RunMarks"]
 

@@ -12,10 +12,10 @@ import numpy as np
 from dearig.drivers.channels import Channel
 from dearig.drivers.rig import Block
 from dearig.model import kernel
-from dearig.model.actuator import NO_AIR, STATUS_WORDS, Actuator, at_rest, initial_state
 from dearig.model.effects import SENSOR_MEMORY
 from dearig.model.errors import ModelError
-from dearig.model.sensor import at_sensor
+from dearig.model.film.sensor import at_sensor
+from dearig.model.simulation.actuator import NO_AIR, STATUS_WORDS, Actuator, at_rest, initial_state
 
 __all__ = ["Overlay", "OverlayModel"]
 

@@ -14,9 +14,9 @@ from dearig.drivers.errors import RefusedWaveform
 from dearig.drivers.gate import BlockGate, GatedWaveform, admit, open_block_gate
 from dearig.drivers.samples import Repeated, Samples
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
 from dearig.model.errors import ModelError
-from dearig.model.material import TABLE_3
+from dearig.model.film.material import TABLE_3
+from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
 
 __all__ = ["Plan", "correctable", "plan"]

@@ -10,9 +10,9 @@ import numpy as np
 from dearig.drivers.gate import Limits
 from dearig.drivers.samples import Repeated, Samples
 from dearig.model import kernel
-from dearig.model.actuator import NO_AIR, STATUS_WORDS, Actuator, at_rest, initial_state
 from dearig.model.effects import SENSOR_MEMORY
 from dearig.model.kinematics import thinning
+from dearig.model.simulation.actuator import NO_AIR, STATUS_WORDS, Actuator, at_rest, initial_state
 
 __all__ = ["PredictedFilm", "peaks_of", "stride_at"]
 

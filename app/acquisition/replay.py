@@ -12,8 +12,8 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError
-from dearig.model.material import Film, Load
-from dearig.recording.reader import open_recording
+from dearig.model.film.material import Film, Load
+from dearig.recording.reading.reader import open_recording
 
 __all__ = ["Original", "original_of"]
 

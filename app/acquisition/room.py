@@ -7,12 +7,12 @@ import math
 from dearig.acquisition.rigs import is_simulated
 from dearig.config.rigfile import RigFile
 from dearig.drivers.errors import RigError
-from dearig.drivers.instruments import room_driver
+from dearig.drivers.instruments.registered import room_driver
+from dearig.drivers.instruments.room_watch import RoomWatch
+from dearig.drivers.instruments.thermohygrometer import RoomLimits, RoomReading, RoomSource
 from dearig.drivers.interlocks import Trip
 from dearig.drivers.rig import Event
-from dearig.drivers.room_watch import RoomWatch
 from dearig.drivers.settings import ThermohygrometerSettings
-from dearig.drivers.thermohygrometer import RoomLimits, RoomReading, RoomSource
 from dearig.errors import InstrumentFault, SafetyStop
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.room import SimulatedSource, air_of_run

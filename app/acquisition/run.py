@@ -41,11 +41,11 @@ from dearig.errors import (
 from dearig.model.errors import ModelError
 from dearig.output_state import Known, OutputState
 from dearig.progress import Progress, quiet
-from dearig.recording.disk_space import check_room
+from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.files import check_output
-from dearig.recording.metadata import RunMetadata
-from dearig.recording.recorder import Recorder
-from dearig.recording.writer import RecordingWriter
+from dearig.recording.writing.disk_space import check_room
+from dearig.recording.writing.recorder import Recorder
+from dearig.recording.writing.writer import RecordingWriter
 
 __all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from dearig.acquisition.feedback import FeedbackReport
 from dearig.acquisition.plan import Plan
 from dearig.drivers.gate import Margin
+from dearig.drivers.instruments.thermohygrometer import RoomReading
 from dearig.drivers.rig import Block, Event, RigIdentity
-from dearig.drivers.thermohygrometer import RoomReading
-from dearig.model.actuator import Actuator
 from dearig.model.control import HoldAnswer
+from dearig.model.simulation.actuator import Actuator
 from dearig.output_state import OutputState
 from dearig.sim_backend.faults import FaultPlan
 

@@ -22,7 +22,7 @@ from dearig.sim_backend.keyence import SimulatedController
 from dearig.sim_backend.serial_port import serve_on_pty, serve_on_socket
 
 if TYPE_CHECKING:
-    from dearig.sim_backend.daqmx.device import Device
+    from dearig.sim_backend.daqmx.card.device import Device
 
 __all__ = ["Serving", "TlsFiles", "needs_simulated_card", "serve"]
 
@@ -105,7 +105,7 @@ def serve(
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")
     with needs_simulated_card():
         from dearig.sim_backend.daqmx.opening import open_device
-        from dearig.sim_backend.daqmx.server import DaqmxServer
+        from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
     try:
         plan = FaultPlan.parse(faults)
         device = open_device(

@@ -16,9 +16,9 @@ from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.run import record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
-from dearig.model.actuator import Actuator
-from dearig.model.jit import cache_folder, is_enabled
-from dearig.model.material import TABLE_3
+from dearig.model.compiled.jit import cache_folder, is_enabled
+from dearig.model.film.material import TABLE_3
+from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
 
 __all__ = ["compile_kernels", "has_cache", "is_warm", "kernels_compiled"]

@@ -12,8 +12,8 @@ from pathlib import Path
 from dearig import __version__
 from dearig.analysis.summary import Assessment
 from dearig.errors import InputError
-from dearig.model.measures import Errors
-from dearig.model.trusted_folder import cache_root
+from dearig.model.compiled.trusted_folder import cache_root
+from dearig.model.readings.measures import Errors
 from dearig.recording.files import file_sha256, replaced_when_done
 
 __all__ = ["Stamp", "keep_assessments", "kept_assessments", "model_key"]

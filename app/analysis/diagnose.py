@@ -11,15 +11,7 @@ from typing import Any
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.run import RunOptions, record
-from dearig.analysis.compatibility import (
-    assumed_by,
-    base_model,
-    check_apart,
-    check_branches,
-    of_rig,
-)
 from dearig.analysis.cores import for_simulations
-from dearig.analysis.early_ends import choose
 from dearig.analysis.experiment import separating_experiment
 from dearig.analysis.outcomes import (
     Comparison,
@@ -29,8 +21,16 @@ from dearig.analysis.outcomes import (
     covariance_table,
     pooled_rms,
 )
-from dearig.analysis.quality import check_enough, extrapolated, few_data, inspect
-from dearig.analysis.records import (
+from dearig.analysis.readings.compatibility import (
+    assumed_by,
+    base_model,
+    check_apart,
+    check_branches,
+    of_rig,
+)
+from dearig.analysis.readings.early_ends import choose
+from dearig.analysis.readings.quality import check_enough, extrapolated, few_data, inspect
+from dearig.analysis.readings.record import (
     Source,
     air_sentences_of,
     as_record,
@@ -52,17 +52,17 @@ from dearig.errors import (
     NotSafe,
     SafetyStop,
 )
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
 from dearig.model.fitting.prediction import prediction_error
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator
 from dearig.model.verdict import NOTHING_MISSING
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
-from dearig.recording.recording import Recording
+from dearig.recording.reading.recording import Recording
 from dearig.units import SHOWN
 
 __all__ = ["VALIDATION", "diagnose_recordings", "diagnose_rig"]

@@ -22,9 +22,9 @@ from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.interlocks import would_trip
 from dearig.drivers.samples import Repeated
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator, Drive
-from dearig.model.excitation import THESIS_AMPLITUDES
 from dearig.model.kernel import OK
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import THESIS_AMPLITUDES
 
 __all__ = ["SEPARATES", "candidates", "separating_experiment"]
 

@@ -25,12 +25,12 @@ from dearig.config.modelfile import ModelFile, model_toml
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
 from dearig.model.control import TrackingTask, VoltageLimits, invert, sensitivity_of
 from dearig.model.errors import ModelError
+from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
-from dearig.recording.reader import open_recording
-from dearig.recording.recording import Recording
+from dearig.recording.reading.reader import open_recording
+from dearig.recording.reading.recording import Recording
 
 __all__ = [
     "HoldOptions",

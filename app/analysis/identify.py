@@ -11,14 +11,7 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.budget import given_values
-from dearig.analysis.compatibility import (
-    assumed_by,
-    base_model,
-    check_apart,
-    check_branches,
-)
 from dearig.analysis.cores import for_simulations
-from dearig.analysis.early_ends import choose
 from dearig.analysis.outcomes import (
     BranchTrial,
     Comparison,
@@ -28,8 +21,15 @@ from dearig.analysis.outcomes import (
     covariance_table,
     pooled_over_noise,
 )
-from dearig.analysis.quality import few_data
-from dearig.analysis.records import (
+from dearig.analysis.readings.compatibility import (
+    assumed_by,
+    base_model,
+    check_apart,
+    check_branches,
+)
+from dearig.analysis.readings.early_ends import choose
+from dearig.analysis.readings.quality import few_data
+from dearig.analysis.readings.record import (
     PUBLISHED_FIT,
     Source,
     as_record,
@@ -45,12 +45,12 @@ from dearig.errors import InputError
 from dearig.model.diagnosis.spring_choice import choose_springs
 from dearig.model.effects import EffectValues
 from dearig.model.errors import ModelError
+from dearig.model.film.material import Network
 from dearig.model.fitting import Identification, add_intervals, identify, with_budget
-from dearig.model.material import Network
-from dearig.model.records import Record
+from dearig.model.readings.records import Record
 from dearig.model.springs import SPRINGS
 from dearig.progress import Progress, quiet
-from dearig.recording.recording import Recording
+from dearig.recording.reading.recording import Recording
 
 __all__ = ["CHOOSE", "identify_recordings"]
 

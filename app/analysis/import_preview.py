@@ -10,11 +10,11 @@ import numpy as np
 
 from dearig.analysis.decimate import decimate
 from dearig.progress import Progress, part, quiet
+from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.importers import Imported, ImportOptions, import_file
 from dearig.recording.importers.importing import WRITING, prepare
 from dearig.recording.importers.listing import Content, content_of
-from dearig.recording.importers.units import Scale
-from dearig.recording.metadata import RunMetadata
+from dearig.recording.importers.quantities.units import Scale
 
 __all__ = ["Trial", "look_into", "try_import", "write_import"]
 

@@ -11,7 +11,7 @@ import numpy as np
 from dearig.analysis.decimate import decimate_path
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
-from dearig.recording.reader import open_recording
+from dearig.recording.reading.reader import open_recording
 
 __all__ = ["Cycle", "Loops", "cycle_edges", "cycles", "loop_area", "loops", "loops_of", "valleys"]
 

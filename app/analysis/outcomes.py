@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from dearig.errors import DearigError
-from dearig.model.noise import LEAD_IN, slow_at_rest
+from dearig.model.readings.noise import LEAD_IN, slow_at_rest
 from dearig.model.verdict import NOTHING_MISSING, STOPPED, Judgement, judge
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.events import Event
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Contribution, Identification
-    from dearig.model.measures import Errors
-    from dearig.recording.early_end import EarlyEnd
-    from dearig.recording.origin import Origin
+    from dearig.model.readings.measures import Errors
+    from dearig.recording.reading.early_end import EarlyEnd
+    from dearig.recording.reading.origin import Origin
 
 __all__ = [
     "BranchTrial",
@@ -64,7 +64,7 @@ class Comparison:
     the measured unit, None where it could not be read. ``role`` is train or validation. ``table``
     is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
     there (f = 0.2 Hz). ``noise_source`` is where the noise is from, as in
-    ``dearig.model.noise``. ``rms_without_events`` is the error in the measured unit
+    ``dearig.model.readings.noise``. ``rms_without_events`` is the error in the measured unit
     without the recording's own drift and ``events``, None where it has none of these. ``ended``
     says how the run ended if it ended early. ``quiet_count`` are the readings at rest that
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.

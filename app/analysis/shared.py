@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dearig.analysis.compatibility import base_model, check_branches
 from dearig.analysis.cores import for_simulations
-from dearig.analysis.early_ends import choose
 from dearig.analysis.outcomes import Comparison
-from dearig.analysis.records import Source, as_record, compare, open_all
+from dearig.analysis.readings.compatibility import base_model, check_branches
+from dearig.analysis.readings.early_ends import choose
+from dearig.analysis.readings.record import Source, as_record, compare, open_all
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.fitting import Estimate, fit_shared

@@ -8,20 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.analysis.records import recording_drive
+from dearig.analysis.readings.record import recording_drive
 from dearig.config.modelfile import ModelFile, load_model, model_toml
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, load_sequence
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator, Drive
-from dearig.model.film import Strip
-from dearig.model.stability import pull_in_voltage
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.stability import pull_in_voltage
+from dearig.model.simulation.strip import Strip
+from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.files import check_output, replaced_when_done
-from dearig.recording.metadata import RunMetadata
-from dearig.recording.origin import MODEL
-from dearig.recording.reader import open_recording
-from dearig.recording.recording import Recording
-from dearig.recording.save import save_recording
+from dearig.recording.reading.origin import MODEL
+from dearig.recording.reading.reader import open_recording
+from dearig.recording.reading.recording import Recording
+from dearig.recording.writing.save import save_recording
 
 __all__ = ["Prediction", "save_prediction", "simulate_model"]
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from dearig.analysis.compatibility import of_rig
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
 from dearig.analysis.outcomes import (
@@ -20,12 +19,13 @@ from dearig.analysis.outcomes import (
     IdentifyOutcome,
     save_fitted_model,
 )
+from dearig.analysis.readings.compatibility import of_rig
 from dearig.analysis.residual import even, spectrum
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.residual import Dependence, MissingStress, Signature
 from dearig.progress import Progress, quiet
-from dearig.recording.reader import open_recording
+from dearig.recording.reading.reader import open_recording
 from dearig.recording.result_folder import numbered_folder
 
 __all__ = ["Residual", "Study", "Task", "Trace", "study"]

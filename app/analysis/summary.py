@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.decimate import decimate
-from dearig.analysis.records import compare
+from dearig.analysis.readings.record import compare
 from dearig.analysis.spectrum import amplitude_density
 from dearig.config.modelfile import load_model
 from dearig.errors import DearigError, InputError
-from dearig.model.actuator import Actuator
-from dearig.model.film import Strip
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.model.measures import Errors
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.readings.measures import Errors
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from dearig.progress import Progress, quiet
 from dearig.recording.exporters import export_recording
-from dearig.recording.index import Entry, glance
-from dearig.recording.reader import open_recording
-from dearig.recording.recording import RecordedEvent, Recording
+from dearig.recording.reading.index import Entry, glance
+from dearig.recording.reading.reader import open_recording
+from dearig.recording.reading.recording import RecordedEvent, Recording
+from dearig.recording.reading.summary import describe_rows
 from dearig.recording.recover import recover
-from dearig.recording.summary import describe_rows
 from dearig.units import name_and_unit, readable
 
 __all__ = [

@@ -20,9 +20,9 @@ from dearig.config.modelfile import ModelFile, model_toml
 from dearig.config.rigfile import RigFile
 from dearig.config.targetfile import LoadedTarget
 from dearig.errors import DearigError, InputError, Interrupted
-from dearig.model.actuator import Actuator
+from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
-from dearig.recording.reader import open_recording
+from dearig.recording.reading.reader import open_recording
 from dearig.recording.result_folder import result_folder
 
 __all__ = ["track"]

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dearig.config.rigfile import RigFile
 from dearig.config.targetfile import LoadedTarget
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
 from dearig.model.control import Inversion, TrackingTask, Unreachable, VoltageLimits, invert
 from dearig.model.errors import ModelError
+from dearig.model.simulation.actuator import Actuator
 
 __all__ = [
     "SAMPLES_MAX",

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from dearig.analysis.quality import inspect
+from dearig.analysis.readings.quality import inspect
 from dearig.analysis.track_target import WITHIN, missed_parts, task_of
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -24,7 +24,6 @@ from dearig.config.sequencefile import LoadedSequence, load_sequence
 from dearig.config.targetfile import LoadedTarget
 from dearig.drivers.gate import Margin
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
 from dearig.model.control import (
     Inversion,
     Learner,
@@ -36,11 +35,12 @@ from dearig.model.control import (
     readings_under,
 )
 from dearig.model.errors import ModelError
-from dearig.model.excitation import Sampled, Sequence
 from dearig.model.fitting.parameters import NORMAL_95, Layout
-from dearig.model.noise import noise_of
-from dearig.model.stability import static_stretch
-from dearig.recording.recording import Recording
+from dearig.model.readings.noise import noise_of
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.excitation import Sampled, Sequence
+from dearig.model.simulation.stability import static_stretch
+from dearig.recording.reading.recording import Recording
 
 __all__ = [
     "KINDS",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dearig.analysis.outcomes import ValidateOutcome
-from dearig.analysis.records import Source, compare, open_all
+from dearig.analysis.readings.record import Source, compare, open_all
 from dearig.config.modelfile import ModelFile, load_model
 from dearig.progress import Progress, quiet
 

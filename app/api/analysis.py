@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
-from dearig.analysis.records import Source
+from dearig.analysis.readings.record import Source
 from dearig.analysis.simulate import simulate_model
 from dearig.analysis.validate import validate_model
 from dearig.api.models import ModelSource, as_model_file
@@ -17,7 +17,7 @@ from dearig.api.results import DiagnoseResult, IdentifyResult, ValidateResult
 from dearig.api.sequences import Sequence, SequenceSource
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
-from dearig.recording.recording import Recording
+from dearig.recording.reading.recording import Recording
 
 __all__ = ["diagnose", "identify", "simulate", "validate"]
 

@@ -9,16 +9,16 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dearig.report import html
-from dearig.report.figure_export import svg
-from dearig.report.figure_style import DRIVE, MARK, NOISE
-from dearig.report.head import head_of
-from dearig.report.tables import Table
+from dearig.report.figures.export import svg
+from dearig.report.figures.style import DRIVE, MARK, NOISE
+from dearig.report.pages import html
+from dearig.report.pages.head import head_of
+from dearig.report.text.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from dearig.recording.origin import Origin
+    from dearig.recording.reading.origin import Origin
 
 __all__ = ["card", "drawing", "facts", "table_html", "write_page"]
 

@@ -18,9 +18,9 @@ from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
 from dearig.recording.json_file import write_json
-from dearig.recording.origin import origin_of
-from dearig.recording.reader import open_recording
-from dearig.report.hold_page import hold_figure, hold_json, hold_summary
+from dearig.recording.reading.origin import origin_of
+from dearig.recording.reading.reader import open_recording
+from dearig.report.pages.hold import hold_figure, hold_json, hold_summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 from dearig.api.display import card, facts, table_html
 from dearig.config.modelfile import ModelFile, load_model, model_toml, save_model
-from dearig.model.actuator import Actuator
-from dearig.model.material import Spring
-from dearig.report.numbers import NO_VALUE, significant
-from dearig.report.sentences import describe_model
-from dearig.report.tables import Row, Table
+from dearig.model.film.material import Spring
+from dearig.model.simulation.actuator import Actuator
+from dearig.report.text.numbers import NO_VALUE, significant
+from dearig.report.text.sentences import describe_model
+from dearig.report.text.tables import Row, Table
 
 __all__ = ["Model", "ModelSource", "as_model_file", "read_model"]
 

@@ -12,10 +12,10 @@ from dearig.analysis import simulate
 from dearig.api.display import card, drawing, facts, write_page
 from dearig.api.models import Model
 from dearig.extras import import_extra
-from dearig.recording.layout import UNITS
-from dearig.recording.origin import Origin
-from dearig.report.numbers import seconds, significant
-from dearig.report.signal_figures import signal_figure
+from dearig.recording.content.layout import UNITS
+from dearig.recording.reading.origin import Origin
+from dearig.report.figures.signals import signal_figure
+from dearig.report.text.numbers import seconds, significant
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rigs import read_faults
 from dearig.acquisition.run import RunOptions
 from dearig.acquisition.run import record as run
-from dearig.analysis.compatibility import of_rig
+from dearig.analysis.readings.compatibility import of_rig
 from dearig.api.display import card, drawing, facts, write_page
 from dearig.api.models import ModelSource, read_model
 from dearig.api.sequences import SequenceSource, as_loaded
@@ -29,14 +29,14 @@ from dearig.config.sequencefile import LoadedSequence
 from dearig.config.toml_input import read_text
 from dearig.drivers.gate import Margin
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
+from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
-from dearig.recording import recording as stored
 from dearig.recording.files import check_output, replaced_when_done
-from dearig.recording.origin import origin_of
-from dearig.recording.reader import open_recording
-from dearig.report.numbers import seconds, significant
-from dearig.report.signal_figures import signal_figure
+from dearig.recording.reading import recording as stored
+from dearig.recording.reading.origin import origin_of
+from dearig.recording.reading.reader import open_recording
+from dearig.report.figures.signals import signal_figure
+from dearig.report.text.numbers import seconds, significant
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

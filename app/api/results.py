@@ -20,15 +20,15 @@ from dearig.api.sequences import Sequence as VoltageSequence
 from dearig.errors import InputError
 from dearig.recording.files import check_output
 from dearig.recording.json_file import write_json
-from dearig.report import diagnosis as words
-from dearig.report import figures
 from dearig.report.as_json import diagnosis_json, outcome_json
-from dearig.report.diagnosis_figures import bars_figure, before_after_figure
-from dearig.report.page import write_report
-from dearig.report.parameter_figures import branches_figure, parameters_figure
-from dearig.report.residual_figures import residual_figure
-from dearig.report.sentences import identify_summary, validate_summary, warnings_of
-from dearig.report.tables import error_table, parameter_table
+from dearig.report.figures import recordings as figures
+from dearig.report.figures.diagnosis import bars_figure, before_after_figure
+from dearig.report.figures.parameters import branches_figure, parameters_figure
+from dearig.report.figures.residual import residual_figure
+from dearig.report.pages.page import write_report
+from dearig.report.text import diagnosis as words
+from dearig.report.text.sentences import identify_summary, validate_summary, warnings_of
+from dearig.report.text.tables import error_table, parameter_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

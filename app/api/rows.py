@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, overload
 
 from dearig.api.display import table_html
 from dearig.extras import import_extra
-from dearig.report.numbers import NO_VALUE, significant
-from dearig.report.tables import Row, Table
+from dearig.report.text.numbers import NO_VALUE, significant
+from dearig.report.text.tables import Row, Table
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.sequencefile import LoadedSequence, load_sequence, parse_sequence
 from dearig.errors import InputError
 from dearig.recording.files import check_output, replaced_when_done
-from dearig.report.numbers import seconds, significant
-from dearig.report.signal_figures import voltage_figure
+from dearig.report.figures.signals import voltage_figure
+from dearig.report.text.numbers import seconds, significant
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -48,7 +48,7 @@ def simulated_daqmx_card(
         Name of the device.
     signals : mapping, optional
         Signals at the digital terminals: ``{"PFI8": "1 kHz, 25 %", "PFI3": "PFI12"}``. Without it
-        the card has those of ``dearig.sim_backend.daqmx.terminals.DEFAULT_SIGNALS``.
+        the card has those of ``dearig.sim_backend.daqmx.card.terminals.DEFAULT_SIGNALS``.
     sine : bool
         Let the analog inputs read a sine within their limits instead of a rig at rest.
     paced : bool
@@ -66,7 +66,7 @@ def simulated_daqmx_card(
         from nidaqmx import GrpcSessionOptions
 
         from dearig.sim_backend.daqmx.opening import open_device
-        from dearig.sim_backend.daqmx.server import DaqmxServer
+        from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
     rig = RigFile.model_validate({"card": {"device": name}})
     device = open_device(
         "sim", rig, rig.as_film(), rig.as_load(),

@@ -19,16 +19,15 @@ from dearig.api.models import ModelSource, read_model
 from dearig.api.recordings import Recording, RigSource, load_rig
 from dearig.config.targetfile import LoadedTarget, load_target, target_of
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
 from dearig.model.control import Unreachable
 from dearig.model.control import inversion as control
+from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.json_file import write_json
-from dearig.recording.reader import open_recording
-from dearig.report.numbers import seconds, significant
-from dearig.report.signal_figures import signal_figure
-from dearig.report.track_page import (
+from dearig.recording.reading.reader import open_recording
+from dearig.report.figures.signals import signal_figure
+from dearig.report.pages.track import (
     errors_figure,
     runs_figure,
     runs_table,
@@ -36,6 +35,7 @@ from dearig.report.track_page import (
     track_summary,
     write_track_report,
 )
+from dearig.report.text.numbers import seconds, significant
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -48,11 +48,11 @@ from dearig.errors import (
 )
 from dearig.output_state import Known, OutputState
 from dearig.progress import Progress, quiet
+from dearig.recording.content.text import text_of
 from dearig.recording.files import write_whole
-from dearig.recording.opening import read_from
-from dearig.recording.reader import open_recording
+from dearig.recording.reading.opening import read_from
+from dearig.recording.reading.reader import open_recording
 from dearig.recording.recover import recover
-from dearig.recording.text import text_of
 
 __all__ = ["Arming", "CampaignOutcome", "Noted", "play_campaign"]
 

@@ -24,7 +24,7 @@ from concurrent.futures import (
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING, Any, Protocol
 
-from dearig.drivers.processes import isolated_spawn
+from dearig.drivers.processes.children import isolated_spawn
 from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.recording.files import in_words, journal_of, one_line

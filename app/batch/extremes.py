@@ -13,7 +13,7 @@ import numpy as np
 from dearig.analysis.loops import cycle_edges
 from dearig.errors import InputError
 from dearig.recording.files import write_whole
-from dearig.recording.reader import open_recording
+from dearig.recording.reading.reader import open_recording
 
 __all__ = ["write_extremes"]
 

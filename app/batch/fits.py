@@ -12,8 +12,8 @@ import logging
 import math
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib import import_module, metadata
 from pathlib import Path
@@ -31,14 +31,15 @@ from dearig.config.modelfile import load_model
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import file_sha256, journal_of, one_line
-from dearig.recording.reader import open_recording
-from dearig.recording.recording import Recording
+from dearig.recording.reading.reader import open_recording
+from dearig.recording.reading.recording import Recording
 
 __all__ = [
     "KINDS",
     "OtherVersion",
     "Row",
     "StudyOptions",
+    "Subject",
     "Task",
     "about",
     "code_digest",
@@ -62,6 +63,18 @@ ONE_AT_A_TIME = threading.Lock()
 
 class OtherVersion(Exception):  # noqa: N818  (what was found)
     """A worker has another version of this program."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A recording of a study: its name in the table, its file, and what is known about it.
+
+    ``beside`` are columns of the run of a campaign: its name and its settings.
+    """
+
+    name: str
+    path: Path
+    beside: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from dearig.config.campaignfile import Campaign, digest_of
 from dearig.config.rigfile import RigFile
 from dearig.drivers.gate import Margin
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
+from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
-from dearig.recording.disk_space import LEFT_FREE, estimate_bytes, free_bytes
+from dearig.recording.writing.disk_space import LEFT_FREE, estimate_bytes, free_bytes
 
 __all__ = ["Forecast", "foresee", "survey"]
 

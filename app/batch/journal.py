@@ -18,8 +18,8 @@ from typing import Any
 
 from dearig.errors import InputError
 from dearig.input_file import read_input
+from dearig.recording.content.layout import iso_time
 from dearig.recording.files import in_words
-from dearig.recording.layout import iso_time
 from dearig.recording.lock import lock_existing
 
 __all__ = ["FORMAT", "JOURNAL", "REQUESTS", "Journal", "append_line", "read_lines"]

@@ -30,8 +30,8 @@ from dearig.batch.queue import DONE, LOST, STOPPED, RunState
 from dearig.config.notify import Event, Notify, redacted
 from dearig.errors import DearigError, SafetyStop
 from dearig.output_state import OutputState
+from dearig.recording.content.layout import iso_time
 from dearig.recording.files import one_line
-from dearig.recording.layout import iso_time
 
 if TYPE_CHECKING:
     from dearig.batch.queue import CampaignOutcome

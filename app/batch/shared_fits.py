@@ -5,19 +5,23 @@ from __future__ import annotations
 import hashlib
 import logging
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from dearig.analysis.shared import identify_shared
-from dearig.batch.fits import ONE_AT_A_TIME, Row, StudyOptions, Task, about, parameter_columns
+from dearig.batch.fits import (
+    ONE_AT_A_TIME,
+    Row,
+    StudyOptions,
+    Subject,
+    Task,
+    about,
+    parameter_columns,
+)
 from dearig.batch.numbers import errors_of, parameter_of
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import one_line
-from dearig.recording.reader import open_recording
-from dearig.recording.recording import Recording
-
-if TYPE_CHECKING:
-    from dearig.batch.studies import Subject
+from dearig.recording.reading.reader import open_recording
+from dearig.recording.reading.recording import Recording
 
 __all__ = ["film_task", "fit_film", "rows_of"]
 

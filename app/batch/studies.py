@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from dearig.batch.engines import ClusterLost, Engine, LocalEngine
-from dearig.batch.fits import KINDS, Row, StudyOptions, Task, fit_task, key_of
+from dearig.batch.fits import KINDS, Row, StudyOptions, Subject, Task, fit_task, key_of
 from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import Queue
 from dearig.batch.shared_fits import film_task, fit_film, rows_of
@@ -21,10 +21,10 @@ from dearig.errors import InputError
 from dearig.input_file import read_input
 from dearig.progress import Progress, quiet
 from dearig.recording.files import in_words
-from dearig.recording.index import ENDINGS, glance, list_folder
 from dearig.recording.json_file import write_json
+from dearig.recording.reading.index import ENDINGS, glance, list_folder
 
-__all__ = ["StudyTable", "Subject", "study_films", "study_recordings", "subjects_of", "with_model"]
+__all__ = ["StudyTable", "study_films", "study_recordings", "subjects_of", "with_model"]
 
 log = logging.getLogger(__name__)
 
@@ -33,18 +33,6 @@ CACHED = "dearig-study-row/1"
 #: Recordings of a study, at most, and bytes of a list of them.
 _MOST, _LIST_BYTES = 100_000, 2**24
 _LISTS = (".txt", ".csv", ".list")
-
-
-@dataclass(frozen=True)
-class Subject:
-    """A recording of a study: its name in the table, its file, and what is known beside it.
-
-    ``beside`` are columns of the run of a campaign: its name and its settings.
-    """
-
-    name: str
-    path: Path
-    beside: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

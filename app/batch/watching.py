@@ -15,10 +15,10 @@ import numpy as np
 from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import CampaignOutcome, Queue, RunState
 from dearig.errors import InputError
-from dearig.recording.follow import Extremes, Follower, News
-from dearig.recording.index import ENDINGS
 from dearig.recording.lock import STILL_RUNNING, refuse_in_use
-from dearig.recording.recording import RecordedEvent
+from dearig.recording.reading.follow import Extremes, Follower, News
+from dearig.recording.reading.index import ENDINGS
+from dearig.recording.reading.recording import RecordedEvent
 
 __all__ = [
     "RECENT",

@@ -123,7 +123,7 @@ def campaign(
     """  # fmt: skip
     from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
-    from dearig.analysis.compatibility import of_rig
+    from dearig.analysis.readings.compatibility import of_rig
     from dearig.batch.campaign import Arming, play_campaign
     from dearig.batch.forecast import foresee
     from dearig.cli.terminal import campaign_runs
@@ -131,7 +131,7 @@ def campaign(
     from dearig.config.modelfile import load_actuator
     from dearig.config.rigfile import load_rig_file
     from dearig.config.toml_input import read_text
-    from dearig.report.campaign_page import (
+    from dearig.report.pages.campaign import (
         campaign_json,
         forecast_json,
         forecast_sentences,
@@ -201,7 +201,7 @@ def campaign_queue(
     from dearig.batch.ask import ask
     from dearig.batch.watching import seen
     from dearig.cli.terminal import campaign_runs
-    from dearig.report.campaign_page import campaign_json
+    from dearig.report.pages.campaign import campaign_json
 
     check_files(force, (), json=json)
     if pause and proceed:

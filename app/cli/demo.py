@@ -21,10 +21,10 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
 from dearig.progress import Progress, quiet
 from dearig.recording.result_folder import result_folder
-from dearig.report.diagnosis_page import write_diagnosis_report
-from dearig.report.figure_export import save_png
-from dearig.report.figures import overview_figure
-from dearig.report.html import write_demo_report
+from dearig.report.figures.export import save_png
+from dearig.report.figures.recordings import overview_figure
+from dearig.report.pages.diagnosis import write_diagnosis_report
+from dearig.report.pages.html import write_demo_report
 
 __all__ = ["HIDDEN", "DemoResult", "run_demo"]
 

@@ -42,7 +42,7 @@ def docs(
     import webbrowser
 
     from dearig.docs import HOME, build, page_named, pages
-    from dearig.model.trusted_folder import cache_root
+    from dearig.model.compiled.trusted_folder import cache_root
     from dearig.recording.files import write_whole
     from dearig.recording.result_folder import result_folder
 

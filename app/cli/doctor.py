@@ -80,7 +80,7 @@ def _guarded(section: str, look: Callable[[], Iterator[Item]]) -> Iterator[Item]
 
 
 def _programs() -> Iterator[Item]:
-    from dearig.recording.provenance import git_revision
+    from dearig.recording.content.provenance import git_revision
 
     revision = git_revision()
     yield Item("programs", "dearig", version() + (f" (revision {revision})" if revision else ""))
@@ -150,8 +150,8 @@ def _extras() -> Iterator[Item]:
 
 def _folders() -> Iterator[Item]:
     from dearig.drivers.settings import CardSettings
-    from dearig.model.trusted_folder import cache_root
-    from dearig.recording.disk_space import estimate_bytes
+    from dearig.model.compiled.trusted_folder import cache_root
+    from dearig.recording.writing.disk_space import estimate_bytes
 
     yield _folder("log", log_file.log_path().parent)
     cache = cache_root()
@@ -209,7 +209,7 @@ def _owner(path: Path) -> str:
 
 
 def _kernels() -> Iterator[Item]:
-    from dearig.model.jit import cache_folder, cache_note, is_compiled
+    from dearig.model.compiled.jit import cache_folder, cache_note, is_compiled
 
     folder = cache_folder()
     owner = _owner(folder) if folder else ""
@@ -277,7 +277,7 @@ def _left_out() -> dict[str, tuple[str, ...]]:
     """Return the sentences of each registry on the entries that it cannot use, by group."""
     from dearig.acquisition.rigs import RIGS
     from dearig.config.segments import SEGMENT_KINDS
-    from dearig.drivers.instruments import INSTRUMENTS
+    from dearig.drivers.instruments.registered import INSTRUMENTS
     from dearig.model.effects import PROBLEMS
     from dearig.recording.exporters import EXPORTS
     from dearig.recording.importers import IMPORTERS

@@ -121,8 +121,8 @@ def import_(
     """Convert measured data (text, Excel, MAT, TDMS, HDF5, JSON, Parquet) to a recording."""
     from dearig.config.imports import imported_metadata, raw_scales
     from dearig.recording.importers import ImportOptions, import_file
-    from dearig.recording.reader import open_recording
-    from dearig.recording.summary import describe
+    from dearig.recording.reading.reader import open_recording
+    from dearig.recording.reading.summary import describe
 
     if columns:
         _list_columns(source, names_line, json)
@@ -232,8 +232,8 @@ def info(
     from rich.table import Table
     from rich.text import Text
 
-    from dearig.recording.reader import open_recording
-    from dearig.recording.summary import describe, describe_rows
+    from dearig.recording.reading.reader import open_recording
+    from dearig.recording.reading.summary import describe, describe_rows
 
     check_files(force, (path,), json=json)
     if verify:
@@ -329,9 +329,9 @@ def recover(
     force: Force = False,
 ) -> None:
     """Repair the recording of a run that was killed, so that any program can read it."""
-    from dearig.recording.reader import open_recording
+    from dearig.recording.reading.reader import open_recording
+    from dearig.recording.reading.summary import describe
     from dearig.recording.recover import recover as repair
-    from dearig.recording.summary import describe
 
     check_files(force, (path,), json=json)
     repaired = repair(path)
@@ -353,7 +353,7 @@ def index_(
     force: Force = False,
 ) -> None:
     """List the recordings in a folder and its subfolders, oldest first."""
-    from dearig.recording.index import index_folder, lines
+    from dearig.recording.reading.index import index_folder, lines
 
     check_files(force, (), json=json)
     with working(json, computes=False) as (_, progress):

@@ -219,7 +219,7 @@ def identify(
         )
         outcome = save_fitted_model(outcome, out, force)
         if report is not None:
-            from dearig.report.html import write_identify_report
+            from dearig.report.pages.html import write_identify_report
 
             write_identify_report(outcome, report)
     if outcome.springs:
@@ -235,7 +235,7 @@ def identify(
 
 def _branches(text: str) -> list[int]:
     """Return the numbers that ``3`` or ``1-4`` stands for."""
-    from dearig.analysis.compatibility import BRANCHES_MAX
+    from dearig.analysis.readings.compatibility import BRANCHES_MAX
 
     found = re.fullmatch(r"\s*([0-9]{1,9})\s*(?:-\s*([0-9]{1,9}))?\s*", text)
     if not found:
@@ -271,7 +271,7 @@ def validate(
     with working(json) as (console, progress):
         outcome = validate_model(model, paths, drive=drive.value, progress=progress)
         if report is not None:
-            from dearig.report.html import write_validate_report
+            from dearig.report.pages.html import write_validate_report
 
             write_validate_report(outcome, report)
     console.print(validate_tables(outcome))
@@ -311,7 +311,7 @@ def diagnose(
     from dearig.config.toml_input import read_text
     from dearig.recording.result_folder import result_folder
     from dearig.report.as_json import diagnosis_json
-    from dearig.report.diagnosis_page import write_diagnosis_report
+    from dearig.report.pages.diagnosis import write_diagnosis_report
 
     given, others = train or [], validate_ or []
     if rig is None and not given:

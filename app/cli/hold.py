@@ -110,7 +110,7 @@ def hold(
     from dearig.config.modelfile import load_model
     from dearig.config.rigfile import load_rig_file
     from dearig.config.toml_input import read_text
-    from dearig.report.hold_page import hold_json, hold_summary
+    from dearig.report.pages.hold import hold_json, hold_summary
 
     length = _seconds(duration)
     written = () if out is None else (out,)

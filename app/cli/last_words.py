@@ -75,7 +75,7 @@ def leave(status: int) -> NoReturn:
     own = sys.__stderr__
     if status and own is not None and own is sys.stderr:
         _discard(own.fileno())
-    recorder = sys.modules.get("dearig.recording.recorder")
+    recorder = sys.modules.get("dearig.recording.writing.recorder")
     if recorder is not None and recorder.is_writing():
         # the operator has stopped waiting for a disk, and the interpreter would wait for it again
         logging.shutdown()

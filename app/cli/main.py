@@ -161,7 +161,7 @@ def _give_matplotlib_a_folder() -> None:
     """
     import platformdirs
 
-    from dearig.model.trusted_folder import cache_root, usable
+    from dearig.model.compiled.trusted_folder import cache_root, usable
 
     asked = os.environ.get("MPLCONFIGDIR")
     usual = (platformdirs.user_config_dir(), platformdirs.user_cache_dir())

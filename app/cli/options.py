@@ -263,7 +263,7 @@ def without_secrets(arguments: Sequence[str]) -> list[str]:
 def _printable_report(path: Path | None) -> Path | None:
     """Refuse a report in PDF that no browser can print, before the work that it reports."""
     if path is not None:
-        from dearig.report.pdf import check_browser, is_pdf
+        from dearig.report.pages.pdf import check_browser, is_pdf
 
         if is_pdf(path):
             check_browser()

@@ -94,7 +94,7 @@ def print_lines(console: Console, texts: Iterable[str], style: str | None = None
 
 def print_early_ends(console: Console, sources: Sequence[Path], choice: str) -> None:
     """Warn of recordings whose runs ended early, before they are used as they are."""
-    from dearig.analysis.early_ends import early_end_warnings
+    from dearig.analysis.readings.early_ends import early_end_warnings
 
     found = early_end_warnings(sources) if choice == "keep" else ()
     if found:
@@ -133,7 +133,7 @@ def write_result(result: dict[str, Any], json: str | None) -> None:
 
 def announce_compilation() -> None:
     """Say on standard error that the kernels are compiled first, unless they are."""
-    from dearig.model.jit import cache_folder, cache_note, is_compiled
+    from dearig.model.compiled.jit import cache_folder, cache_note, is_compiled
 
     folder, note = cache_folder(), cache_note()
     if folder is None:

@@ -109,7 +109,7 @@ def record(
     from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.acquisition.run import record as run
-    from dearig.analysis.compatibility import of_rig
+    from dearig.analysis.readings.compatibility import of_rig
     from dearig.batch.notify import Notifier
     from dearig.config.modelfile import load_actuator
     from dearig.config.notify import Notify

@@ -98,7 +98,7 @@ def study(
     from dearig.batch.shared_fits import fit_film
     from dearig.batch.studies import study_films, study_recordings, subjects_of, with_model
     from dearig.cli.terminal import study_rows
-    from dearig.report.study_table import study_table_json
+    from dearig.report.text.study_table import study_table_json
 
     check_files(force, (model, *(s for s in sources if s.is_file())), json=json)
     options = with_model(

@@ -12,7 +12,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from dearig.printable import printable
-from dearig.report.diagnosis import (
+from dearig.report.text.diagnosis import (
     before_after_table,
     effect_table,
     experiment_table,
@@ -23,9 +23,9 @@ from dearig.report.diagnosis import (
     thesis_before_after_table,
     warnings,
 )
-from dearig.report.numbers import to_ascii
-from dearig.report.sentences import identify_summary, listed, validate_summary, warnings_of
-from dearig.report.tables import (
+from dearig.report.text.numbers import to_ascii
+from dearig.report.text.sentences import identify_summary, listed, validate_summary, warnings_of
+from dearig.report.text.tables import (
     Table,
     branch_trials,
     by_thesis_table,
@@ -106,14 +106,14 @@ def spring_table(outcome: IdentifyOutcome) -> RenderableType:
 
 def track_table(outcome: TrackOutcome) -> RenderableType:
     """Return a target that was followed as sentences, and the error of every run."""
-    from dearig.report.track_page import runs_table, track_summary, track_warnings
+    from dearig.report.pages.track import runs_table, track_summary, track_warnings
 
     return _Fitted([*track_summary(outcome), runs_table(outcome)], track_warnings(outcome))
 
 
 def trend_tables(trends: Trends) -> RenderableType:
     """Return trends as sentences, the effects, and what to vary next."""
-    from dearig.report.trend_words import effect_table, proposal_sentences, trends_sentences
+    from dearig.report.text.trends import effect_table, proposal_sentences, trends_sentences
 
     return _Fitted(
         [*trends_sentences(trends), effect_table(trends), *proposal_sentences(trends)], ()
@@ -122,7 +122,7 @@ def trend_tables(trends: Trends) -> RenderableType:
 
 def campaign_runs(outcome: CampaignOutcome, most: int = 40) -> RenderableType:
     """Return how a campaign stands, and the ``most`` runs around the one that is played."""
-    from dearig.report.campaign_page import campaign_summary, campaign_table
+    from dearig.report.pages.campaign import campaign_summary, campaign_table
 
     warnings = (outcome.queue.halted,) if outcome.queue.halted else ()
     return _Fitted([*campaign_summary(outcome), campaign_table(outcome, most)], warnings)
@@ -130,7 +130,7 @@ def campaign_runs(outcome: CampaignOutcome, most: int = 40) -> RenderableType:
 
 def study_rows(table: StudyTable, most: int) -> RenderableType:
     """Return the table of a study of many recordings, at most ``most`` rows of it."""
-    from dearig.report.study_table import study_table_rows, study_table_sentences
+    from dearig.report.text.study_table import study_table_rows, study_table_sentences
 
     return _Fitted([*study_table_sentences(table), study_table_rows(table, most)], ())
 

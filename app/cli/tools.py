@@ -32,7 +32,7 @@ def pdf(
     force: Force = False,
 ) -> None:
     """Print a report to a PDF file, with Chromium, Chrome or Edge."""
-    from dearig.report.pdf import print_report
+    from dearig.report.pages.pdf import print_report
 
     written = report.with_suffix(".pdf") if out is None else out
     check_files(force, (report,), written, json=None)

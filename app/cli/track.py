@@ -115,7 +115,7 @@ def track(
     from dearig.config.rigfile import load_rig_file
     from dearig.config.targetfile import load_target
     from dearig.config.toml_input import read_text
-    from dearig.report.track_page import track_json, write_track_report
+    from dearig.report.pages.track import track_json, write_track_report
 
     check_files(force, (target, model, compare, rig_file), json=json)
     loaded, settings = load_target(target), load_rig_file(rig_file)

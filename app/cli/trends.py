@@ -60,8 +60,8 @@ def trends(
     from dearig.batch.table_file import read_table
     from dearig.batch.trends import find_trends, table_of, write_trends
     from dearig.cli.terminal import trend_tables
-    from dearig.report.trend_words import trends_json
-    from dearig.report.trends_page import write_trends_report
+    from dearig.report.pages.trends import write_trends_report
+    from dearig.report.text.trends import trends_json
 
     source = table_of(table)
     folder = source.parent if out is None else out

@@ -97,7 +97,7 @@ def watch(
     if port is not None:
         _serve(view, port, host, token_file, every or 0.1)
         return
-    from dearig.report.watch_state import watch_json
+    from dearig.report.pages.watch_state import watch_json
 
     console = console_for(json)
     if once or json is not None or not console.is_terminal:
@@ -164,7 +164,7 @@ def _recording_lines(state: Seen, ascii_only: bool) -> Iterator[RenderableType]:
 
     from dearig.batch.watching import RECENT
     from dearig.printable import printable
-    from dearig.report.watch_state import in_order, shown_channel
+    from dearig.report.pages.watch_state import in_order, shown_channel
 
     how = "ended" if state.ended else "killed" if state.abandoned else "recording"
     simulated = ", simulated" if state.simulated else ""

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.specimen import Film, Load
-from dearig.recording.assumed import ASSUMED, FILM_VALUES
-from dearig.recording.importers.units import Scale
-from dearig.recording.metadata import RunMetadata
+from dearig.model.film.specimen import Film, Load
+from dearig.recording.content.assumed import ASSUMED, FILM_VALUES
+from dearig.recording.content.metadata import RunMetadata
+from dearig.recording.importers.quantities.units import Scale
 
 if TYPE_CHECKING:
     from dearig.config.rigfile import RigFile
@@ -61,7 +61,7 @@ def imported_metadata(
     load: Load | None = None if settings is None else settings.as_load()
     if changed or load_g is not None:
         # imports the effects and their compiler, which most imports begin without
-        from dearig.model.material import THESIS_FILM, THESIS_LOAD
+        from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
     try:
         if changed and kinematics is not None:
             changed["kinematics"] = kinematics

@@ -13,11 +13,11 @@ from pydantic import Field, ValidationError
 
 from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
 from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
-from dearig.model.film import Strip
-from dearig.model.material import Branch, Film, Load, Network, Spring
+from dearig.model.film.material import Branch, Film, Load, Network, Spring
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from dearig.model.springs import LIMIT, SPRING_LAWS
 from dearig.recording.files import check_output, replaced_when_done
 

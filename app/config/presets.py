@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from dearig.model.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES
+from dearig.model.simulation.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES
 
 __all__ = ["PRESETS", "VALIDATION_A", "VALIDATION_B"]
 

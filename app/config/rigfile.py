@@ -15,7 +15,7 @@ from dearig.config.toml_input import allowed, meant, parse_toml, read_text, show
 from dearig.drivers.gate import Limits
 from dearig.drivers.settings import RigSettings, Section
 from dearig.errors import InputError
-from dearig.model.material import Film, Load
+from dearig.model.film.material import Film, Load
 from dearig.recording.files import check_output, replaced_when_done
 
 __all__ = [

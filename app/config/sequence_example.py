@@ -16,7 +16,7 @@ from dearig.config.segments import SEGMENT_KINDS, SegmentTable
 from dearig.config.segments.base import KV
 from dearig.config.sequencefile import HEAD_FIELDS
 from dearig.config.toml_input import allowed
-from dearig.model.excitation import Segment
+from dearig.model.simulation.excitation import Segment
 
 __all__ = ["example", "page"]
 

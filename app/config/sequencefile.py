@@ -23,7 +23,7 @@ from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml
 from dearig.drivers.samples import Computed, Samples
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.excitation import Segment, Sequence, join
+from dearig.model.simulation.excitation import Segment, Sequence, join
 
 __all__ = [
     "HEAD_FIELDS",

@@ -23,7 +23,7 @@ from dearig.config.sequencefile import LoadedSequence, read_sequence
 from dearig.config.toml_input import parse_toml, read_text, shown
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.excitation import Sampled, Sequence
+from dearig.model.simulation.excitation import Sampled, Sequence
 
 __all__ = ["EXAMPLE", "LoadedTarget", "load_target", "parse_target", "target_of"]
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dearig.recording.disk_space import check_room, estimate_bytes, free_bytes
+from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.exporters import EXPORTS, export_recording
-from dearig.recording.follow import Follower
 from dearig.recording.importers import import_file
-from dearig.recording.metadata import RunMetadata
-from dearig.recording.reader import open_recording
-from dearig.recording.recording import RecordedEvent, Recording
+from dearig.recording.reading.follow import Follower
+from dearig.recording.reading.reader import open_recording
+from dearig.recording.reading.recording import RecordedEvent, Recording
+from dearig.recording.reading.summary import describe, describe_rows
 from dearig.recording.recover import recover
-from dearig.recording.save import save_recording
-from dearig.recording.summary import describe, describe_rows
 from dearig.recording.verify import Verification, verify
-from dearig.recording.writer import RecordingWriter
+from dearig.recording.writing.disk_space import check_room, estimate_bytes, free_bytes
+from dearig.recording.writing.save import save_recording
+from dearig.recording.writing.writer import RecordingWriter
 
 __all__ = [
     "EXPORTS",

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from dearig.errors import InputError
 from dearig.input_file import why_no_file
+from dearig.recording.content.journal import carry_out, whole_journal
+from dearig.recording.content.superblock import repair_superblock
 from dearig.recording.files import in_words
-from dearig.recording.finish import finish
-from dearig.recording.journal import carry_out, whole_journal
 from dearig.recording.lock import lock_existing
-from dearig.recording.opening import UNREADABLE
-from dearig.recording.reader import is_finished, open_recording
-from dearig.recording.superblock import repair_superblock
+from dearig.recording.reading.opening import UNREADABLE
+from dearig.recording.reading.reader import is_finished, open_recording
+from dearig.recording.writing.finish import finish
 
 __all__ = ["recover"]
 

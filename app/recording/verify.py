@@ -14,22 +14,22 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.input_file import why_no_file
-from dearig.recording.checksums import wrong_blocks
-from dearig.recording.finish import OVERVIEW
-from dearig.recording.flushes import flush_notes
-from dearig.recording.journal import whole_journal
-from dearig.recording.layout import EVENT_LEVELS, SIGNALS, counts_name
+from dearig.recording.content.checksums import wrong_blocks
+from dearig.recording.content.flushes import flush_notes
+from dearig.recording.content.journal import whole_journal
+from dearig.recording.content.layout import EVENT_LEVELS, SIGNALS, counts_name
+from dearig.recording.content.physical import KELVIN, SLICE, Counts
+from dearig.recording.content.provenance import CONTINUES
+from dearig.recording.content.pyramid import BINS
+from dearig.recording.content.safe import Refused, dataset, group
+from dearig.recording.content.superblock import consistency_flags
+from dearig.recording.content.text import text_of
+from dearig.recording.content.timestamps import compare_clocks, local_time
 from dearig.recording.lock import refuse_in_use
-from dearig.recording.opening import LOOKS, UNREADABLE, damage, file_state, opened
-from dearig.recording.physical import KELVIN, SLICE, Counts
-from dearig.recording.provenance import CONTINUES
-from dearig.recording.pyramid import BINS
-from dearig.recording.reader import open_recording
-from dearig.recording.recording import Recording
-from dearig.recording.safe import Refused, dataset, group
-from dearig.recording.superblock import consistency_flags
-from dearig.recording.text import text_of
-from dearig.recording.timestamps import compare_clocks, local_time
+from dearig.recording.reading.opening import LOOKS, UNREADABLE, damage, file_state, opened
+from dearig.recording.reading.reader import open_recording
+from dearig.recording.reading.recording import Recording
+from dearig.recording.writing.finish import OVERVIEW
 
 __all__ = ["Verification", "verify"]
 

@@ -13,7 +13,7 @@ from dearig.analysis.outcomes import (
     pooled_over_noise,
     pooled_steady_rms,
 )
-from dearig.report.sentences import warnings_of
+from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
@@ -309,7 +309,7 @@ def _stand_json(stand: Stand) -> dict[str, Any]:
 
 def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, Any] | None:
     """Errors pooled over recordings (see ``report.diagnosis.pooled_errors``); None without any."""
-    from dearig.report.diagnosis import pooled_errors
+    from dearig.report.text.diagnosis import pooled_errors
 
     errors = pooled_errors(comparisons)
     if errors is None:
@@ -328,7 +328,7 @@ def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, 
 
 def _selection_json(stage: Stage, train: tuple[Comparison, ...], kind: str) -> dict[str, Any]:
     """Of a cross-validation: its errors, relative to the ranges of the training recordings."""
-    from dearig.report.diagnosis import pooled_errors
+    from dearig.report.text.diagnosis import pooled_errors
 
     shown, errors = SHOWN[kind], pooled_errors(train)
 

@@ -14,14 +14,14 @@ import numpy as np
 from dearig.analysis.outcomes import Comparison
 from dearig.analysis.study import Residual, Study, Task, Trace, study
 from dearig.errors import InputError
-from dearig.model.measures import Errors
+from dearig.model.readings.measures import Errors
 from dearig.model.residual import Dependence, MissingStress
 from dearig.progress import Progress, quiet
 from dearig.recording.files import in_words, replaced_when_done
 from dearig.recording.json_file import write_json
-from dearig.report.page import write_report
+from dearig.report.pages.page import write_report
 from dearig.report.study_view import Pair, Pieces, StudyView, view_of
-from dearig.report.tables import Row, Table
+from dearig.report.text.tables import Row, Table
 
 __all__ = ["FORMAT", "StudyEntry", "make_study", "open_study", "save_study", "studies_in"]
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
-from dearig.report import diagnosis, sentences, tables
 from dearig.report.as_json import diagnosis_json, outcome_json
-from dearig.report.tables import Table
+from dearig.report.text import diagnosis, sentences, tables
+from dearig.report.text.tables import Table
 from dearig.units import readable
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from dearig.batch.queue import DONE, LOST, RUNNING, SKIPPED, STOPPED, WAITING, C
 from dearig.batch.watching import RECENT, Bins, Seen, SourceWatch
 from dearig.errors import InputError
 from dearig.printable import printable
-from dearig.report.campaign_page import campaign_summary, campaign_table, duration_text
-from dearig.report.watch_state import ShownChannel, in_order, shown_channel
+from dearig.report.pages.campaign import campaign_summary, campaign_table, duration_text
+from dearig.report.pages.watch_state import ShownChannel, in_order, shown_channel
 
 __all__ = ["look"]
 

@@ -8,10 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from dearig.drivers.processes import child_environment
+from dearig.drivers.processes.children import child_environment
 from dearig.errors import InputError
+from dearig.window import NO_SCREEN
 
-__all__ = ["NO_SCREEN", "require_qt", "require_screen", "run_window"]
+__all__ = ["require_qt", "require_screen", "run_window"]
 
 # a closed terminal or a stopped service must not leave a voltage on
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -23,8 +24,6 @@ _TRY = (
     "from PySide6.QtGui import QGuiApplication; QGuiApplication([])"
 )
 _TRY_FOR = 30.0  # s; a remote screen may be slow
-#: platforms of Qt whose windows nobody sees
-NO_SCREEN = ("offscreen", "minimal")
 
 
 def run_window(
@@ -47,12 +46,12 @@ def run_window(
 
     from dearig.config.rigfile import load_rig_file
     from dearig.config.toml_input import read_text
-    from dearig.window.collector import Collector
-    from dearig.window.frame import MainWindow
-    from dearig.window.restore import SessionKeeper, kept_folder, restore
-    from dearig.window.session import Session
-    from dearig.window.settings import open_settings
-    from dearig.window.theme import prepare_plots, system_theme
+    from dearig.window.jobs.collector import Collector
+    from dearig.window.kit.theme import prepare_plots, system_theme
+    from dearig.window.session.settings import open_settings
+    from dearig.window.session.state import Session
+    from dearig.window.shell.frame import MainWindow
+    from dearig.window.shell.last_session import SessionKeeper, kept_folder, restore
 
     # before the window opens: faults of a file belong in the terminal where it was named
     settings = load_rig_file(rig_file)

@@ -9,8 +9,8 @@ import math
 
 import pytest
 
-from dearig.drivers.amplifier import AmplifierDriver, Monitors
-from dearig.drivers.findings import Finding
+from dearig.drivers.instruments.amplifier import AmplifierDriver, Monitors
+from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.settings import AmplifierSettings, RigSettings
 
 __all__ = ["AmplifierContract"]

@@ -10,8 +10,8 @@ from contextlib import AbstractContextManager
 
 import pytest
 
-from dearig.drivers.findings import Finding
-from dearig.drivers.laser import LaserDriver, LaserInspection, analog_findings
+from dearig.drivers.instruments.findings import Finding
+from dearig.drivers.instruments.laser import LaserDriver, LaserInspection, analog_findings
 from dearig.drivers.settings import LaserSettings
 
 __all__ = ["LaserContract"]

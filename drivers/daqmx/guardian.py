@@ -22,7 +22,7 @@ from typing import Any, Protocol
 from dearig.drivers import sources
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.errors import RigError
-from dearig.drivers.processes import has_unread, isolated_command
+from dearig.drivers.processes.children import has_unread, isolated_command
 from dearig.drivers.settings import RigSettings
 
 __all__ = ["WORD", "Guardian", "GuardianProcess", "TakeOver"]

@@ -19,11 +19,12 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 
-from dearig.drivers import priority, sources
+from dearig.drivers import sources
 from dearig.drivers.daqmx.guardian import WORD, TakeOver
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.errors import NotAtZero, RigError
+from dearig.drivers.processes import priority
 from dearig.drivers.settings import RigSettings
 from dearig.drivers.zero_reading import ZeroReading
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from dearig.drivers.amplifier import Monitors
 from dearig.drivers.daqmx.explain import instrument_errors
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.daqmx.tasks import ClockedTasks
 from dearig.drivers.daqmx.watchdog import watchdog_finding
 from dearig.drivers.errors import LinkRefused, RigError
-from dearig.drivers.findings import Finding
+from dearig.drivers.instruments.amplifier import Monitors
+from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.settings import RigSettings
 
 __all__ = ["Inspection", "inspect"]

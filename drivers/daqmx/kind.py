@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dearig.drivers.daqmx import inspection, rig
 from dearig.drivers.daqmx.address import Address
-from dearig.drivers.findings import Finding
-from dearig.drivers.instruments import instrument_findings, reading_findings
+from dearig.drivers.instruments.findings import Finding
+from dearig.drivers.instruments.registered import instrument_findings, reading_findings
 from dearig.drivers.rig import Rig
 from dearig.drivers.rig_kind import RigOptions
 from dearig.drivers.settings import RigSettings

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dearig.drivers.daqmx.certificates import read_certificates
 from dearig.drivers.errors import LinkRefused, RigError
-from dearig.drivers.findings import Finding
+from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.settings import CardSettings, RigSettings
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dearig.drivers.findings import Finding, Verdict
+from dearig.drivers.instruments.findings import Finding, Verdict
 from dearig.drivers.settings import CardSettings
 
 __all__ = ["WATCHDOG", "watchdog_finding", "watchdog_words"]

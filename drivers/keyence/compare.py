@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from dearig.drivers.findings import Finding, Verdict
+from dearig.drivers.instruments.findings import Finding, Verdict
 from dearig.drivers.settings import LaserSettings
 
 __all__ = ["ControllerSettings", "compare", "settings_findings"]

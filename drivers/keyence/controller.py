@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import TypeVar
 
 from dearig.drivers.errors import RigError
+from dearig.drivers.instruments.serial_line import Port, PortError, open_serial_port
 from dearig.drivers.keyence.commands import (
     AVERAGING,
     CALCULATIONS,
@@ -23,7 +24,6 @@ from dearig.drivers.keyence.commands import (
     Command,
 )
 from dearig.drivers.keyence.compare import ControllerSettings
-from dearig.drivers.serial_line import Port, PortError, open_serial_port
 from dearig.drivers.settings import LaserSettings
 
 __all__ = ["Keyence", "LaserError", "NoReading", "Port", "open_port"]

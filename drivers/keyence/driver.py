@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable
 from typing import Literal
 
+from dearig.drivers.instruments.laser import LaserInspection
 from dearig.drivers.keyence.controller import Port, open_port
 from dearig.drivers.keyence.inspection import inspect
-from dearig.drivers.laser import LaserInspection
 from dearig.drivers.settings import LaserSettings
 
 __all__ = ["DRIVER", "KeyenceDriver"]

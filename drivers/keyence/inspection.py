@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from dearig.drivers.findings import Finding
+from dearig.drivers.instruments.findings import Finding
+from dearig.drivers.instruments.laser import LaserInspection, where_to_look
 from dearig.drivers.keyence.compare import settings_findings
 from dearig.drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
-from dearig.drivers.laser import LaserInspection, where_to_look
 from dearig.drivers.settings import LaserSettings
 
 __all__ = ["inspect"]

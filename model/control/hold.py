@@ -22,10 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.control.readings import mean_without_outliers
 from dearig.model.errors import ModelError
-from dearig.model.stability import static_stretch
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.stability import static_stretch
 
 __all__ = ["HoldAnswer", "HoldController", "HoldSettings", "sensitivity_of"]
 

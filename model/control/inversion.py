@@ -27,20 +27,27 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # loads its parts when they are first used, which a run may never do
 
-from dearig.model.actuator import NO_AIR, STATUS_WORDS, Actuator, Drive, at_rest, reading_of
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, MODULUS, WIDTH
 from dearig.model.control.bands import low_pass
 from dearig.model.control.linear import level_of, linearise, repeatable_part
 from dearig.model.control.task import TrackingTask
 from dearig.model.effects import PLACES, SENSOR_MEMORY
 from dearig.model.errors import ModelError
-from dearig.model.film import unit_stresses
+from dearig.model.film.network import HEAD
+from dearig.model.film.sensor import at_sensor
 from dearig.model.kernel import OK, read_sensor
 from dearig.model.kernel.balance import carried_stress
 from dearig.model.kinematics import electric_along, thinning
-from dearig.model.network import HEAD
-from dearig.model.sensor import at_sensor
-from dearig.model.stability import pull_in_voltage, static_stretch
+from dearig.model.simulation.actuator import (
+    NO_AIR,
+    STATUS_WORDS,
+    Actuator,
+    Drive,
+    at_rest,
+    reading_of,
+)
+from dearig.model.simulation.stability import pull_in_voltage, static_stretch
+from dearig.model.simulation.strip import unit_stresses
 
 __all__ = ["CAUSES", "Inversion", "Unreachable", "invert"]
 

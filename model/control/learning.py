@@ -38,7 +38,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy  # loads its parts when they are first used, which a run may never do
 
-from dearig.model.actuator import Actuator
 from dearig.model.control.bands import low_pass, pass_band
 from dearig.model.control.inversion import Inversion, invert
 from dearig.model.control.learning_settings import LearningSettings
@@ -46,6 +45,7 @@ from dearig.model.control.linear import level_of, linearise
 from dearig.model.control.readings import bridged, has_jump, sorted_out
 from dearig.model.control.task import TrackingTask
 from dearig.model.errors import ModelError
+from dearig.model.simulation.actuator import Actuator
 
 __all__ = ["Learner", "Lesson"]
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from dearig.model.actuator import Actuator, Drive, reading_of
 from dearig.model.control.bands import padded_length, pass_band
 from dearig.model.control.task import TrackingTask
 from dearig.model.effects import EFFECTS
 from dearig.model.effects.description import Effect
 from dearig.model.errors import ModelError
 from dearig.model.kernel import OK
+from dearig.model.simulation.actuator import Actuator, Drive, reading_of
 
 __all__ = ["Linearised", "level_of", "linearise", "readings_under", "repeatable_part"]
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.control.learning_settings import LearningSettings
-from dearig.model.noise import READINGS_MIN, about_rest
+from dearig.model.readings.noise import READINGS_MIN, about_rest
 
 __all__ = [
     "Readings",

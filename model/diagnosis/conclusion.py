@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.engine import Found, Race
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
@@ -20,7 +19,6 @@ from dearig.model.diagnosis.results import (
 )
 from dearig.model.diagnosis.stages import DRIFT_LAW, stage_of
 from dearig.model.effects import EFFECTS
-from dearig.model.film import Strip
 from dearig.model.residual import (
     MissingStress,
     Signature,
@@ -30,6 +28,8 @@ from dearig.model.residual import (
     missing_stress,
     signatures,
 )
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from dearig.model.verdict import (
     EXPLAINED,
     NOTHING_MISSING,

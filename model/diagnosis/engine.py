@@ -15,8 +15,8 @@ from dearig.model.diagnosis.race import Candidate, race
 from dearig.model.diagnosis.regression import Regression, Start, is_unseen
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS, Effect
-from dearig.model.environment import recorded_of
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.environment import recorded_of
+from dearig.model.readings.records import ActuatorRecord
 
 __all__ = ["Found", "Race", "Search"]
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit, Fitter, fit_of, with_effect
 from dearig.model.diagnosis.preparation import without_spikes
@@ -22,7 +21,8 @@ from dearig.model.diagnosis.shapes import typical_values
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting.broyden import descend_broyden
 from dearig.model.fitting.slow_noise import WhitenedProblem
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.records import ActuatorRecord, Record
+from dearig.model.simulation.actuator import Actuator
 
 __all__ = ["Event", "Own", "drifts_at_rest", "own_of"]
 

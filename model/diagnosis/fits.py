@@ -11,7 +11,6 @@ from threading import Lock
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.preparation import (
     prepared,
     with_model_error,
@@ -20,7 +19,6 @@ from dearig.model.diagnosis.preparation import (
 )
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
-from dearig.model.film import Strip
 from dearig.model.fitting.broyden import descend_broyden
 from dearig.model.fitting.coarse_drive import coarse_drive_of
 from dearig.model.fitting.estimates import recentre
@@ -37,7 +35,9 @@ from dearig.model.fitting.slow_noise import (
     late_basis,
     pink_density,
 )
-from dearig.model.records import ActuatorRecord, Record, counted
+from dearig.model.readings.records import ActuatorRecord, Record, counted
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = ["DRIFT", "Fit", "Fitter", "Work", "fit_of", "with_effect"]
 

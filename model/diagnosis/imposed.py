@@ -20,7 +20,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from dearig.model.actuator import NO_AIR, Actuator, at_rest
 from dearig.model.coefficients import (
     ELECTRIC,
     FORCE,
@@ -34,13 +33,14 @@ from dearig.model.coefficients import (
 )
 from dearig.model.effects import EFFECTS, MEMORY, PLACES, SENSOR_MEMORY
 from dearig.model.errors import ModelError
-from dearig.model.film import Strip, unit_stresses
+from dearig.model.film.material import Branch, Network
+from dearig.model.film.network import HEAD
 from dearig.model.kernel import OK, read_sensor
 from dearig.model.kernel.balance import carried_stress, effect_inertia
 from dearig.model.kinematics import electric_along
-from dearig.model.material import Branch, Network
-from dearig.model.network import HEAD
-from dearig.model.records import ActuatorRecord, FilmRecord
+from dearig.model.readings.records import ActuatorRecord, FilmRecord
+from dearig.model.simulation.actuator import NO_AIR, Actuator, at_rest
+from dearig.model.simulation.strip import Strip, unit_stresses
 
 __all__ = [
     "ImposedActuator",

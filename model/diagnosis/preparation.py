@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
-from dearig.model.film import Strip
 from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.thinning import thinned
-from dearig.model.noise import about_rest, noise_at_rest, rounding, tails_of
-from dearig.model.records import ActuatorRecord, FilmRecord, Record, bridged, counted
-from dearig.model.spikes import spikes
+from dearig.model.readings.noise import about_rest, noise_at_rest, rounding, tails_of
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, bridged, counted
+from dearig.model.readings.spikes import spikes
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = [
     "FILM_MODEL_ERROR",

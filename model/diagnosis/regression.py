@@ -21,7 +21,6 @@ from itertools import combinations, pairwise
 import numpy as np
 from scipy.optimize import lsq_linear, nnls
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.imposed import (
     ImposedActuator,
     ImposedStrip,
@@ -32,9 +31,10 @@ from dearig.model.diagnosis.least_squares import bounded, lagrange, well_determi
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import Extent, amplitudes, moved, shape_points, typical_values
 from dearig.model.effects import PLACES, Effect
-from dearig.model.film import Strip, unit_stresses
 from dearig.model.fitting.slow_noise import Drift, DriftSpace, drift_modes
-from dearig.model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip, unit_stresses
 
 __all__ = ["Regression", "Start", "electric", "is_unseen"]
 

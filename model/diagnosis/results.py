@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.effects import EFFECTS, Curve
-from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 from dearig.model.residual import MissingStress, Signature, Unnamed
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = [
     "Candidate",

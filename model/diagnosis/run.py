@@ -6,14 +6,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.conclusion import conclude
 from dearig.model.diagnosis.engine import Found, Search
 from dearig.model.diagnosis.fits import Fit, Fitter
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from dearig.model.film import Strip
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.records import ActuatorRecord, Record
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = ["diagnose"]
 

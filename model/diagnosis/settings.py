@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dearig.model.noise import NOISE_MARGIN
+from dearig.model.readings.noise import NOISE_MARGIN
 
 __all__ = ["DiagnosisSettings", "Rung"]
 

@@ -12,7 +12,7 @@ from scipy.stats.qmc import Sobol
 
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import Effect, Parameter
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.records import ActuatorRecord, Record
 
 __all__ = [
     "Extent",

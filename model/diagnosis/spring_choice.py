@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit, Fitter, fit_of
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.errors import ModelError
-from dearig.model.film import Strip
+from dearig.model.film.material import Network
 from dearig.model.fitting.identify import fit_globally
 from dearig.model.fitting.left_out import left_out
 from dearig.model.fitting.levenberg import descend
-from dearig.model.material import Network
-from dearig.model.records import Record
+from dearig.model.readings.records import Record
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = ["SpringTrial", "choose_springs"]
 

@@ -9,17 +9,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit
 from dearig.model.diagnosis.results import Stage
 from dearig.model.effects import EFFECTS
-from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 from dearig.model.fitting.estimates import estimates_with_intervals
 from dearig.model.fitting.left_out import left_out
 from dearig.model.fitting.slow_noise import WhitenedProblem
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.records import ActuatorRecord, Record
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = ["DRIFT_LAW", "drift_values", "stage_of", "with_drift"]
 

@@ -20,9 +20,9 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
+from dearig.model.compiled.jit import cache_folder
 from dearig.model.effects.hooks import FASTEST, HOOKS
 from dearig.model.effects.registry import EFFECTS, PLACES
-from dearig.model.jit import cache_folder
 
 __all__ = [
     "HOOKS",
@@ -130,7 +130,7 @@ def {effect}_stiffness(c, k, m, j, lam, rate):
 def _text() -> str:
     """Return the source of the hooks."""
     names = sorted(EFFECTS, key=_rank)
-    lines = ["from dearig.model.jit import jit"]
+    lines = ["from dearig.model.compiled.jit import jit"]
     modules = {name: f"_effect_{i}" for i, name in enumerate(names)}
     lines += [f"import {PLACES[n].module.__name__} as {alias}" for n, alias in modules.items()]
     lines += [

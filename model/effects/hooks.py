@@ -1,10 +1,10 @@
 """The places of the equations where an effect takes part: names, arguments and values of hooks.
 
-A hook is a compiled function (``dearig.model.jit.jit``) in the module of an effect. It takes
-``(c, k, m, j)`` and the arguments below. ``c`` is the coefficient vector; the effect's parameters
-are ``c[k]``, ``c[k + 1]``, ... in the order of ``EFFECT.parameters``. ``m`` is the state; the
-effect's own state variables are ``m[j]``, ... ``m[j + EFFECT.memory - 1]``. They are 0 at rest. A
-hook makes no arrays, changes no coefficient and no other effect's state.
+A hook is a compiled function (``dearig.model.compiled.jit.jit``) in the module of an effect. It
+takes ``(c, k, m, j)`` and the arguments below. ``c`` is the coefficient vector; the effect's
+parameters are ``c[k]``, ``c[k + 1]``, ... in the order of ``EFFECT.parameters``. ``m`` is the
+state; the effect's own state variables are ``m[j]``, ... ``m[j + EFFECT.memory - 1]``. They are 0
+at rest. A hook makes no arrays, changes no coefficient and no other effect's state.
 """
 
 from __future__ import annotations

@@ -13,19 +13,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 from types import MappingProxyType, ModuleType
 from typing import Any
 
 import numba
 import numpy as np
 
-from dearig.model import effects as _folder
 from dearig.model.coefficients import EFFECTS_AT
+from dearig.model.compiled.jit import is_enabled, use_cache_without
+from dearig.model.compiled.plugins import entry_points_found, origin
+from dearig.model.effects import library
 from dearig.model.effects.description import Effect, EffectValues, faults_of
 from dearig.model.effects.hooks import HOOKS, Hook
-from dearig.model.jit import is_enabled, use_cache_without
-from dearig.model.plugins import entry_points_found, origin
 
 __all__ = [
     "EFFECTS",
@@ -48,7 +48,6 @@ __all__ = [
 EFFECTS_MAX = 62
 
 _OURS = "dearig"
-_NOT_EFFECTS = ("assembly", "contract", "description", "hooks", "registry")
 
 
 @dataclass(frozen=True)
@@ -145,7 +144,7 @@ def hook_faults(module: ModuleType) -> list[str]:
 
 def _compilation_faults(name: str, function: Any, hook: Hook) -> list[str]:
     if not hasattr(function, "py_func"):
-        return [f"its hook {name} is not compiled: decorate it with dearig.model.jit.jit"]
+        return [f"its hook {name} is not compiled: decorate it with dearig.model.compiled.jit.jit"]
     array, number, index = numba.float64[::1], numba.float64, numba.int64
     count = len(inspect.signature(function.py_func).parameters) - 4
     taken = (array, index, array, index, *[number] * count)
@@ -165,13 +164,13 @@ def _compilation_faults(name: str, function: Any, hook: Hook) -> list[str]:
 
 def _found() -> _Finder:
     finder = _Finder()
-    for name in sorted(m.name for m in iter_modules(_folder.__path__)):
-        if name not in _NOT_EFFECTS:
-            module = import_module(f"{_folder.__name__}.{name}")
-            # hooks of this folder are compiled with the kernel, and their tests check the rest
-            if module.EFFECT.name in finder.effects:
-                raise ImportError(f"two effects are called {module.EFFECT.name!r}")
-            finder.add(module, _OURS)
+    files = walk_packages(library.__path__, f"{library.__name__}.")
+    for name in sorted((m.name for m in files if not m.ispkg), key=lambda n: n.rpartition(".")[2]):
+        module = import_module(name)
+        # hooks of this folder are compiled with the kernel, and their tests check the rest
+        if module.EFFECT.name in finder.effects:
+            raise ImportError(f"two effects are called {module.EFFECT.name!r}")
+        finder.add(module, _OURS)
     for entry_point in entry_points_found():
         finder.add_plugin(entry_point)
     if finder.problems:

@@ -14,14 +14,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.errors import ModelError
 from dearig.model.fitting.identify import Identification, coarse_problem
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Contribution, GivenValue, Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.records import ActuatorRecord, Record
+from dearig.model.simulation.actuator import Actuator
 
 __all__ = ["with_budget"]
 

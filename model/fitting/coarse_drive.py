@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, Drive, reading_of
-from dearig.model.records import ActuatorRecord
-from dearig.model.sensor import at_sensor
+from dearig.model.film.sensor import at_sensor
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator, Drive, reading_of
 
 __all__ = ["CoarseDrive", "coarse_drive_of"]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from dearig.model.effects import EFFECTS, EffectValues
 from dearig.model.fitting.offsets import centred
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.records import ActuatorRecord, Record
 
 __all__ = ["DriftFit", "RecordDrift", "record_drift"]
 

@@ -13,7 +13,7 @@ from dearig.model.fitting.intervals import correlation_time, covariance, profile
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Estimate, Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.records import ActuatorRecord, FilmRecord
+from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
 __all__ = ["AT_BOUND", "at_bound", "estimates_with_intervals", "is_determined", "recentre"]
 

@@ -13,9 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.errors import ModelError
-from dearig.model.film import Strip
 from dearig.model.fitting.estimates import at_bound, is_determined
 from dearig.model.fitting.identify import coarse_problem, fit_globally
 from dearig.model.fitting.intervals import correlation_time
@@ -23,7 +21,9 @@ from dearig.model.fitting.levenberg import gain_that_counts
 from dearig.model.fitting.parameters import NORMAL_95, Estimate, Layout, require_free
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress
-from dearig.model.records import Record
+from dearig.model.readings.records import Record
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = ["SharedFit", "fit_shared"]
 

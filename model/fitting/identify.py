@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator
 from dearig.model.errors import ModelError
-from dearig.model.film import Strip
+from dearig.model.film.material import Network
 from dearig.model.fitting.estimates import (
     AT_BOUND,
     at_bound,
@@ -25,8 +24,9 @@ from dearig.model.fitting.parameters import Contribution, Estimate, Layout, requ
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
 from dearig.model.fitting.thinning import thinned
-from dearig.model.material import Network
-from dearig.model.records import FilmRecord, Record
+from dearig.model.readings.records import FilmRecord, Record
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = [
     "METHODS",

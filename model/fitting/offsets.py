@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.records import ActuatorRecord, Record
 
 __all__ = ["Offsets", "centred"]
 

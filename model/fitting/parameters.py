@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.coefficients import (
     CAPACITANCE,
     ELECTRIC,
@@ -24,9 +23,10 @@ from dearig.model.coefficients import (
 )
 from dearig.model.effects import EFFECTS, PLACES, EffectValues, Parameter, any_hysteretic
 from dearig.model.errors import ModelError
-from dearig.model.film import Strip
-from dearig.model.material import Branch, Network, Spring
-from dearig.model.network import HEAD, nominal_pull, shape_at
+from dearig.model.film.material import Branch, Network, Spring
+from dearig.model.film.network import HEAD, nominal_pull, shape_at
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from dearig.model.springs import LIMIT as LIMIT_NAME
 from dearig.model.springs import SPRING_LAWS, SPRINGS, ShapeParameter, locking_strain
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
-from dearig.model.film import Strip
 from dearig.model.fitting.parameters import NORMAL_95, Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.records import Record
+from dearig.model.readings.records import Record
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 __all__ = ["prediction_error"]
 

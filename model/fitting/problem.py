@@ -8,15 +8,15 @@ from copy import copy
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, readings_of
 from dearig.model.effects import EFFECTS, SENSOR_COLUMNS
 from dearig.model.errors import ModelError
-from dearig.model.film import Strip, stress_of
 from dearig.model.fitting.drift import DriftFit, record_drift
 from dearig.model.fitting.offsets import Offsets
 from dearig.model.fitting.parallel import parallel_map
 from dearig.model.fitting.parameters import Layout
-from dearig.model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.simulation.actuator import Actuator, readings_of
+from dearig.model.simulation.strip import Strip, stress_of
 
 __all__ = ["Problem", "agrees"]
 

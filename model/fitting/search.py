@@ -11,16 +11,16 @@ import numpy as np
 from scipy.optimize import OptimizeResult, differential_evolution, nnls
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator
 from dearig.model.coefficients import ELECTRIC, MODULUS
 from dearig.model.errors import ModelError
-from dearig.model.film import unit_stresses
+from dearig.model.film.material import Branch, Network, Spring
+from dearig.model.film.network import HEAD
 from dearig.model.fitting.parameters import THESIS_RANGES, Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.kinematics import electric_along
-from dearig.model.material import Branch, Network, Spring
-from dearig.model.network import HEAD
-from dearig.model.records import ActuatorRecord, FilmRecord
+from dearig.model.readings.records import ActuatorRecord, FilmRecord
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import unit_stresses
 from dearig.model.springs import SPRING_LAWS
 
 __all__ = [

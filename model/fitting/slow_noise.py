@@ -20,8 +20,8 @@ import numpy as np
 from dearig.model.fitting.offsets import centred
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.noise import about_rest
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.noise import about_rest
+from dearig.model.readings.records import ActuatorRecord, Record
 
 __all__ = [
     "Drift",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, reading_of
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator, reading_of
 
 __all__ = ["thinned"]
 

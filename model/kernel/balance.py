@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, INERTIA
+from dearig.model.compiled.jit import allocating, jit
 from dearig.model.effects import MEMORY, assembly
-from dearig.model.jit import allocating, jit
 from dearig.model.kinematics import electric
 
 __all__ = ["carried_stress", "effect_inertia"]

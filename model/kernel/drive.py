@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, HELD, INERTIA, UNIFORM
+from dearig.model.compiled.jit import allocating, inlined, jit, read_only
 from dearig.model.effects import MEMORY
-from dearig.model.jit import allocating, inlined, jit, read_only
 from dearig.model.kernel.effect_forces import (
     BREATHES,
     active_effects,
@@ -354,8 +354,8 @@ def drive_by_voltage(
     (2, N) is the temperature in K and the relative humidity (0 to 1) of the room above those of the
     start, or (2, 0) where none were recorded.
     ``fidelity`` is ``CAREFUL``, ``QUICK``, ``ROUGH`` or ``COARSE``. ``c`` must know the stretch at
-    rest (``dearig.model.actuator.at_rest``). ``stretch`` and ``rate`` (N,) are filled; element 0 is
-    the state as given, so that a record can be cut and continued.
+    rest (``dearig.model.simulation.actuator.at_rest``). ``stretch`` and ``rate`` (N,) are filled;
+    element 0 is the state as given, so that a record can be cut and continued.
 
     Returns ``(status, reached, steps)``: on any status but ``OK`` the samples from ``reached`` on
     are filled with the last stretch that was reached, never with NaN. ``steps`` were taken; a

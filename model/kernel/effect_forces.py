@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.coefficients import FORCE, INERTIA
+from dearig.model.compiled.jit import inlined, jit
 from dearig.model.effects import assembly
-from dearig.model.jit import inlined, jit
-from dearig.model.network import branch_count
+from dearig.model.film.network import branch_count
 
 __all__ = [
     "BREATHES",

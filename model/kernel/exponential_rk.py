@@ -8,9 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from dearig.model.coefficients import ELECTRIC, FORCE, HELD, INERTIA, KIND, MODULUS, RATE, WIDTH
+from dearig.model.coefficients import (
+    ELECTRIC,
+    FORCE,
+    HELD,
+    INERTIA,
+    KIND,
+    MODULUS,
+    RATE,
+    WIDTH,
+)
+from dearig.model.compiled.jit import allocating, inlined, jit
 from dearig.model.effects import MEMORY
-from dearig.model.jit import allocating, inlined, jit
+from dearig.model.film.network import HEAD, branch_count
 from dearig.model.kernel.effect_forces import (
     COMMIT,
     affected,
@@ -29,7 +39,6 @@ from dearig.model.kernel.propagator import (
     RELAXATION,
     STIFFNESS,
 )
-from dearig.model.network import HEAD, branch_count
 from dearig.model.springs import SPRINGS
 
 __all__ = ["BRANCHES_MAX", "exponential_steps", "film_table", "is_swift"]

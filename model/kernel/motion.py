@@ -19,10 +19,10 @@ from dearig.model.coefficients import (
     SHAPE,
     WIDTH,
 )
-from dearig.model.jit import allocating, inlined, jit
+from dearig.model.compiled.jit import allocating, inlined, jit
+from dearig.model.film.network import HEAD, branch_count, nominal_pull_slope, shape_at, true_pull
 from dearig.model.kernel.status import LOCKED, NOT_CONVERGED, PULL_IN
 from dearig.model.kinematics import electric, electric_slope, strain_and_pull
-from dearig.model.network import HEAD, branch_count, nominal_pull_slope, shape_at, true_pull
 from dearig.model.springs import SPRINGS, Shape
 
 __all__ = [

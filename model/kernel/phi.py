@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 
 __all__ = ["double_phi", "fill_phi"]
 

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from dearig.model.jit import inlined, jit
+from dearig.model.compiled.jit import inlined, jit
 from dearig.model.kernel.phi import double_phi, fill_phi
 
 __all__ = [

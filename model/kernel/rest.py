@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, KIND, LOCKING, MODULUS
+from dearig.model.compiled.jit import jit
 from dearig.model.effects import assembly
-from dearig.model.jit import jit
+from dearig.model.film.network import HEAD, nominal_pull, shape_at
 from dearig.model.kernel.motion import STRETCH_MAX, strain_at
 from dearig.model.kernel.status import NO_REST, OK, PULL_IN
 from dearig.model.kinematics import electric
-from dearig.model.network import HEAD, nominal_pull, shape_at
 
 __all__ = ["rest_stretch"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, INERTIA, UNIFORM
-from dearig.model.jit import inlined, jit
+from dearig.model.compiled.jit import inlined, jit
 from dearig.model.kernel.effect_forces import (
     COMMIT,
     affected,

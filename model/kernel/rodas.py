@@ -21,12 +21,12 @@ from dearig.model.coefficients import (
     UNIFORM,
     WIDTH,
 )
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
+from dearig.model.film.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, shape_at
 from dearig.model.kernel.motion import admissible, rates
 from dearig.model.kernel.rodas_coefficients import ALPHA, GAMMA, A, C, D
 from dearig.model.kernel.status import NOT_CONVERGED, OK
 from dearig.model.kinematics import electric, electric_slope
-from dearig.model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, shape_at
 
 __all__ = ["LONGEST", "WORTH", "cross_by_rodas", "rodas_step"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from dearig.model.compiled.jit import jit
 from dearig.model.effects import assembly
-from dearig.model.jit import jit
 
 __all__ = ["read_sensor"]
 

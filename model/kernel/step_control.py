@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dearig.model.jit import inlined, jit
+from dearig.model.compiled.jit import inlined, jit
 from dearig.model.kernel.effect_forces import (
     DRAGS,
     HYSTERETIC,

@@ -15,14 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from dearig.model.actuator import Actuator, at_rest
 from dearig.model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
 from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, assembly
-from dearig.model.film import Strip, unit_stresses
+from dearig.model.film.network import HEAD
 from dearig.model.fitting.search import SMOOTHING
 from dearig.model.kinematics import thinning
-from dearig.model.network import HEAD
-from dearig.model.records import ActuatorRecord, FilmRecord, Record, bridged
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, bridged
+from dearig.model.simulation.actuator import Actuator, at_rest
+from dearig.model.simulation.strip import Strip, unit_stresses
 
 __all__ = ["MissingStress", "missing_stress"]
 

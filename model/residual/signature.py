@@ -12,8 +12,8 @@ from scipy.signal import welch
 from scipy.stats import chi2, norm
 
 from dearig.model.fitting.intervals import correlation_time, unevenness
-from dearig.model.noise import NOISE_MARGIN
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.readings.noise import NOISE_MARGIN
+from dearig.model.readings.records import ActuatorRecord, Record
 
 __all__ = ["Dependence", "Signature", "signatures"]
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 from dearig.model.springs.description import LIMIT, ShapeParameter, SpringLaw
 
 SPRING = SpringLaw(

@@ -7,7 +7,7 @@ are per unit modulus, which is the initial shear modulus in Pa (for Arruda-Boyce
 
 from __future__ import annotations
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 from dearig.model.springs import (
     arruda_boyce,
     extended_tube,

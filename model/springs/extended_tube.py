@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 from dearig.model.springs.description import LIMIT, ShapeParameter, SpringLaw
 from dearig.model.springs.ogden import power_energy, power_pull, power_pull_slope
 

@@ -5,7 +5,7 @@ I2 - 3 of an incompressible film is lam1^-2 + lam2^-2 + lam3^-2 - 3.
 
 from __future__ import annotations
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 from dearig.model.springs.description import ShapeParameter, SpringLaw
 from dearig.model.springs.ogden import power_energy, power_pull, power_pull_slope
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 from dearig.model.springs.description import ShapeParameter, SpringLaw
 
 SPRING = SpringLaw(

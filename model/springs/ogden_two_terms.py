@@ -5,7 +5,7 @@ W = mu (1 - s) 2/alpha^2 (sum lam^alpha - 3) + mu s 2/beta^2 (sum lam^beta - 3)
 
 from __future__ import annotations
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 from dearig.model.springs.description import ShapeParameter, SpringLaw
 from dearig.model.springs.ogden import power_energy, power_pull, power_pull_slope
 

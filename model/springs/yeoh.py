@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 from dearig.model.springs.description import ShapeParameter, SpringLaw
 
 

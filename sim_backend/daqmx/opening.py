@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from dearig.drivers.settings import RigSettings
-from dearig.model.material import Film, Load
+from dearig.model.film.material import Film, Load
 from dearig.sim_backend.clock import Clock, ManualClock, PacedClock
 from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.factory import plant_of

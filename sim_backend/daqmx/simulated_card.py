@@ -9,11 +9,8 @@ import numpy as np
 
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.clock import Clock
-from dearig.sim_backend.daqmx.counters import CounterInput
-from dearig.sim_backend.daqmx.digital import DigitalInput, DigitalOutput, check_clocked_lines
-from dearig.sim_backend.daqmx.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.pulses import CounterOutput, PulseSignal
-from dearig.sim_backend.daqmx.tasks import (
+from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.card.tasks import (
     LINES_RATE,
     TIMEBASE,
     Channel,
@@ -26,10 +23,17 @@ from dearig.sim_backend.daqmx.tasks import (
     Task,
     physical_names,
 )
-from dearig.sim_backend.daqmx.terminals import COUNTERS
-from dearig.sim_backend.daqmx.triggered_device import TriggeredDevice
-from dearig.sim_backend.daqmx.triggers import Edge
-from dearig.sim_backend.daqmx.work import InputWork
+from dearig.sim_backend.daqmx.card.terminals import COUNTERS
+from dearig.sim_backend.daqmx.card.triggered_device import TriggeredDevice
+from dearig.sim_backend.daqmx.card.triggers import Edge
+from dearig.sim_backend.daqmx.card.work import InputWork
+from dearig.sim_backend.daqmx.digital.counters import CounterInput
+from dearig.sim_backend.daqmx.digital.digital import (
+    DigitalInput,
+    DigitalOutput,
+    check_clocked_lines,
+)
+from dearig.sim_backend.daqmx.digital.pulses import CounterOutput, PulseSignal
 from dearig.sim_backend.plant import Plant
 
 __all__ = ["SimulatedCard"]

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dearig.model.material import TABLE_3, Branch, Film, Load, Network, Spring
+from dearig.model.film.material import TABLE_3, Branch, Film, Load, Network, Spring
 from dearig.sim_backend.laser_noise import NOISES, WHITE
 from dearig.sim_backend.truth.effect import Draw, TruthEffect
 from dearig.sim_backend.truth.effects import (

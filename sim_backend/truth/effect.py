@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.plant import Air
 from dearig.sim_backend.truth.film import FilmNumbers
 

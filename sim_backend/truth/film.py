@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dearig.model.jit import allocating, jit
-from dearig.model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
+from dearig.model.compiled.jit import allocating, jit
+from dearig.model.film.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
 from dearig.sim_backend.truth import second_laws
 from dearig.sim_backend.truth.second_laws import (
     added_stress,

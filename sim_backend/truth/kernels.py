@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dearig.model.jit import allocating, jit
+from dearig.model.compiled.jit import allocating, jit
 
 __all__ = [
     "delayed",

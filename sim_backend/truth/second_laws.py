@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 
 __all__ = [
     "NOTHING",

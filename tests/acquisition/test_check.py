@@ -9,9 +9,9 @@ import pytest
 
 from dearig.acquisition.check import CheckOutcome, check_rig
 from dearig.config.rigfile import RigFile
-from dearig.drivers.amplifier import Monitors
 from dearig.drivers.daqmx.inspection import Inspection
-from dearig.drivers.findings import Finding
+from dearig.drivers.instruments.amplifier import Monitors
+from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.settings import LaserSettings
 from dearig.errors import InputError
 from dearig.sim_backend.faults import FaultPlan

@@ -19,7 +19,7 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError, InstrumentFault, SafetyStop
 from dearig.model.control import HoldAnswer, HoldController
 from dearig.recording import open_recording
-from dearig.recording.summary import describe_rows
+from dearig.recording.reading.summary import describe_rows
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.rig import SimulatedRig
 

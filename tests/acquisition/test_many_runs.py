@@ -17,8 +17,8 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.rig import Block
 from dearig.errors import Interrupted
-from dearig.model.actuator import Actuator
-from dearig.model.material import TABLE_3
+from dearig.model.film.material import TABLE_3
+from dearig.model.simulation.actuator import Actuator
 from tests.tools.command import LOBE
 
 RUNS, WARM_UP = 100, 40

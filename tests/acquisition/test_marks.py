@@ -17,8 +17,8 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.rig import Block, Event
 from dearig.errors import InputError, Interrupted
 from dearig.recording import open_recording
-from dearig.recording.marks import NOTE_BYTES, Mark, marks_in
-from dearig.recording.recording import RecordedEvent, Recording
+from dearig.recording.reading.marks import NOTE_BYTES, Mark, marks_in
+from dearig.recording.reading.recording import RecordedEvent, Recording
 from tests.tools.command import LOBE
 
 LOADED = parse_sequence(LOBE, "lobe", Path())

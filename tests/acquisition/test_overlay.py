@@ -10,9 +10,9 @@ import pytest
 from dearig.acquisition.overlay import Overlay
 from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block
-from dearig.model.actuator import Actuator, Drive
-from dearig.model.excitation import Lobes, Ramp, Sequence, Steps
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import Lobes, Ramp, Sequence, Steps
 
 RATE = 1000.0
 SCALING = Scaling((0.0, 10.0 / 32768), 1000.0)

@@ -15,9 +15,9 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.drivers import gate
 from dearig.errors import InputError, Interrupted
-from dearig.model.actuator import Actuator, Drive
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.kinematics import thinning
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.simulation.actuator import Actuator, Drive
 
 LOBES = 'kind = "thesis"\namplitudes_kV = [5.0, 7.5]\nfrequencies_Hz = [1.0, 2.0]\n'
 STEPS = 'kind = "steps"\nlevels_kV = [5.0, 7.0, 2.0, 0.0]\ndwell_s = 0.4\nrise_s = 0.02\n'

@@ -11,10 +11,10 @@ from dearig.acquisition.check import check_rig
 from dearig.acquisition.run import RunObserver, RunOptions, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
+from dearig.drivers.instruments.thermohygrometer import RoomReading
 from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
-from dearig.drivers.thermohygrometer import RoomReading
 from dearig.errors import InstrumentFault, SafetyStop
-from dearig.recording.reader import open_recording
+from dearig.recording.reading.reader import open_recording
 from dearig.sim_backend.faults import FaultPlan
 
 SINE = """

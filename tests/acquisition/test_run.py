@@ -36,13 +36,13 @@ from dearig.errors import (
     Interrupted,
     SafetyStop,
 )
-from dearig.model.actuator import Actuator
-from dearig.model.excitation import Sampled
-from dearig.model.material import TABLE_3
+from dearig.model.film.material import TABLE_3
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.excitation import Sampled
 from dearig.output_state import OutputState
 from dearig.recording import open_recording
-from dearig.recording.recorder import Recorder, is_writing
-from dearig.recording.writer import RecordingWriter
+from dearig.recording.writing.recorder import Recorder, is_writing
+from dearig.recording.writing.writer import RecordingWriter
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.rig import SimulatedRig
 from tests.tools.command import LOBE, dearig, names, write
@@ -396,7 +396,8 @@ def test_a_disk_that_gets_full_ends_the_run_before_it_is(
 ) -> None:
     ticks = iter(np.arange(0.0, 100.0, 0.15))
     monkeypatch.setattr(
-        "dearig.recording.writer.shutil.disk_usage", lambda _: SimpleNamespace(free=80_000_000)
+        "dearig.recording.writing.writer.shutil.disk_usage",
+        lambda _: SimpleNamespace(free=80_000_000),
     )
     rig = Troubled("", lambda: None)
     monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
@@ -642,7 +643,7 @@ def test_a_disk_that_is_full_to_the_end_keeps_the_counts(
     def no_room(*_: object, **__: object) -> None:
         raise InputError("run.h5 cannot be written: No space left on device")
 
-    monkeypatch.setattr("dearig.recording.writer.finish", no_room)
+    monkeypatch.setattr("dearig.recording.writing.writer.finish", no_room)
     rig = Troubled("read", fault)
     answer = command(rig)
     # what ended the run is said first, and the disk after it

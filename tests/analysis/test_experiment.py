@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from dearig.acquisition.plan import plan
-from dearig.analysis.compatibility import of_rig
 from dearig.analysis.experiment import SEPARATES, candidates, separating_experiment
+from dearig.analysis.readings.compatibility import of_rig
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.interlocks import would_trip
 from dearig.drivers.settings import CardSettings
-from dearig.model.actuator import Actuator, Drive
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load
+from dearig.model.simulation.actuator import Actuator, Drive
 
 NOISE = 1e-6
 

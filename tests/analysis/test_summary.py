@@ -27,13 +27,13 @@ from dearig.analysis.summary import (
 )
 from dearig.config.modelfile import save_model
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
-from dearig.model.film import Strip
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network, Spring
-from dearig.model.trusted_folder import CacheFolder
+from dearig.model.compiled.trusted_folder import CacheFolder
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network, Spring
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from dearig.recording import open_recording
-from dearig.recording.recording import RecordedEvent
-from tests.window.recordings import killed, made
+from dearig.recording.reading.recording import RecordedEvent
+from tests.window.made_recordings import killed, made
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +178,9 @@ def test_long_curves_keep_their_peaks(folder, monkeypatch):
 
 def test_no_file_is_hashed_to_draw_its_curves(folder, monkeypatch):
     hashed: list[Path] = []
-    monkeypatch.setattr("dearig.recording.recording.file_sha256", lambda p: hashed.append(p) or "")
+    monkeypatch.setattr(
+        "dearig.recording.reading.recording.file_sha256", lambda p: hashed.append(p) or ""
+    )
     assert curves(folder / "high.h5", None).model is not None
     assert spectra(folder / "high.h5", None).residual is not None
     assert assess(folder / "high.h5", None).errors is not None

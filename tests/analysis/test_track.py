@@ -19,11 +19,11 @@ from dearig.config.sequencefile import load_sequence
 from dearig.config.targetfile import parse_target
 from dearig.drivers.settings import CardSettings, LimitsSettings
 from dearig.errors import InputError, Interrupted, SafetyStop
-from dearig.model.actuator import Actuator
 from dearig.model.control import CAUSES
-from dearig.model.film import Strip
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.recording.reader import open_recording
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
+from dearig.recording.reading.reader import open_recording
 from dearig.sim_backend.faults import FaultPlan
 
 PATH = """\

@@ -10,8 +10,8 @@ import pytest
 
 import dearig
 from dearig.config.modelfile import save_model
-from dearig.model.actuator import Actuator
-from dearig.model.material import TABLE_3, Film, Load
+from dearig.model.film.material import TABLE_3, Film, Load
+from dearig.model.simulation.actuator import Actuator
 
 from .conftest import SLOW_RIG
 

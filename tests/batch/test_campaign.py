@@ -19,9 +19,9 @@ from dearig.batch.queue import Queue
 from dearig.batch.watching import seen
 from dearig.config.modelfile import save_model
 from dearig.errors import DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
-from dearig.model.actuator import Actuator
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.report.campaign_page import campaign_table
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.simulation.actuator import Actuator
+from dearig.report.pages.campaign import campaign_table
 from tests.tools.command import LOBE
 from tests.tools.played import PLAN, RIG_FILE, UNKNOWN, Bench, Killed
 

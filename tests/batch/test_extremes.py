@@ -11,7 +11,7 @@ import pytest
 from dearig.analysis.loops import cycles, valleys
 from dearig.batch.extremes import write_extremes
 from dearig.recording import RunMetadata
-from dearig.recording.save import save_recording
+from dearig.recording.writing.save import save_recording
 
 RATE = 100.0
 REST = np.zeros(30)

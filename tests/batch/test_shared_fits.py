@@ -16,7 +16,7 @@ from dearig.batch.studies import StudyTable, study_films, subjects_of, with_mode
 from dearig.drivers.rig import Block
 from dearig.errors import InputError
 from dearig.model.fitting import Estimate
-from dearig.recording.recording import Recording
+from dearig.recording.reading.recording import Recording
 from tests.tools.recordings import run_counts, writer
 
 FILMS = {"a.h5": "F1", "b.h5": "F1", "c.h5": "F2", "d.h5": ""}

@@ -21,8 +21,8 @@ from dearig.batch.fits import StudyOptions, about, fit_task, key_of
 from dearig.batch.studies import study_recordings, subjects_of, with_model
 from dearig.errors import InputError
 from dearig.recording import RunMetadata
-from dearig.recording.reader import open_recording
-from dearig.recording.save import save_recording
+from dearig.recording.reading.reader import open_recording
+from dearig.recording.writing.save import save_recording
 from tests.tools.command import dearig, done, names, refused, thesis_model
 from tests.tools.played import Bench
 from tests.tools.recordings import run_counts, write_run

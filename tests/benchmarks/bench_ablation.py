@@ -31,7 +31,6 @@ import numpy as np
 from scipy.stats import binomtest
 
 from dearig.config.rigfile import RigFile
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.conclusion import Conclusion
 from dearig.model.diagnosis.engine import Search
 from dearig.model.diagnosis.evidence import Judge, family_of
@@ -40,9 +39,10 @@ from dearig.model.diagnosis.regression import Regression
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import Extent
 from dearig.model.effects import Effect
+from dearig.model.film.material import TABLE_3
 from dearig.model.fitting.slow_noise import WhitenedProblem
-from dearig.model.material import TABLE_3
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator
 from dearig.sim_backend.laser_noise import NOISES, WHITE
 from dearig.sim_backend.truth.cases import HANDS
 from tests.blind.play import Bench, Case, records_of

@@ -22,13 +22,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import beta
 
-from dearig.model.actuator import Actuator, Drive
 from dearig.model.diagnosis import diagnose
 from dearig.model.effects import EffectValues
-from dearig.model.excitation import Sequence
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Network
 from dearig.model.fitting import Estimate, identify
-from dearig.model.material import THESIS_FILM, THESIS_LOAD, Network
-from dearig.model.records import ActuatorRecord, counted
+from dearig.model.readings.records import ActuatorRecord, counted
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import Sequence
 
 EFFECTS_DRAWN: tuple[EffectValues, ...] = (
     (("load inertia", (("moving_mass", 0.15),)),),

@@ -24,15 +24,15 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import family_of
 from dearig.model.diagnosis.fits import Fitter, with_effect
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import typical_values
 from dearig.model.effects import EFFECTS
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from dearig.model.fitting import identify
-from dearig.model.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator
 from tests.benchmarks.residual_peers import PEERS, Course, missing, predicted
 from tests.blind.play import MODES, Bench, Case, diagnose, records_of
 from tests.blind.seeds import clean_seeds, drawn, family_seeds

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import pytest
 
-from dearig.analysis.quality import extrapolated
+from dearig.analysis.readings.quality import extrapolated
 from dearig.recording import open_recording
-from dearig.recording.recording import Recording
+from dearig.recording.reading.recording import Recording
 from tests.tools.command import done
 from tests.tools.recordings import measured_data
 

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from dearig.model.effects import EFFECTS
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.truth import second_laws
 from dearig.sim_backend.truth.cases import SECOND_FORMS
 from dearig.sim_backend.truth.effect import TruthEffect

@@ -27,7 +27,7 @@ from dearig.drivers.contract.rig import lobes
 from dearig.drivers.daqmx.rig import open_daqmx_rig
 from dearig.sim_backend.clock import PacedClock
 from dearig.sim_backend.daqmx.opening import open_device
-from dearig.sim_backend.daqmx.server import DaqmxServer
+from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
 from tests.campaign.trouble import Load
 
 IDLE_S, LOADED_S = 0.5, 1.0  # allowed from the kill to 0 V

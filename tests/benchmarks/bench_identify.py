@@ -11,13 +11,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dearig.model.actuator import Actuator, Drive
-from dearig.model.excitation import Sequence
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.fitting import Identification, identify
 from dearig.model.fitting.search import ALGORITHM_1
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.model.measures import errors
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.measures import errors
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import Sequence
 
 NOISE = 1e-6
 STEP = 0.01

@@ -53,7 +53,7 @@ def read_pyarrow(path: Path) -> None:
 
 
 def read_columns(path: Path) -> None:
-    from dearig.recording.importers.text_file import TextFile
+    from dearig.recording.importers.formats.text_file import TextFile
 
     TextFile(path).read(COLUMNS)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from dearig.batch.trends import find_trends
 from dearig.drivers.rig import Block
-from dearig.recording.index import index_folder
+from dearig.recording.reading.index import index_folder
 from tests.tools.recordings import run_counts, writer
 
 _FILMS = 20

@@ -17,10 +17,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from dearig.model.actuator import Drive
 from dearig.model.control import invert
 from dearig.model.control.linear import repeatable_part
 from dearig.model.errors import ModelError
+from dearig.model.simulation.actuator import Drive
 from tests.tools.effect_cases import BY_VOLTAGE, THESIS, numbers
 from tests.tools.targets import LEAD_IN, RATE, path, task
 

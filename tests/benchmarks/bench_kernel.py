@@ -21,19 +21,19 @@ from scipy.integrate import odeint, solve_ivp
 from sksundae.cvode import CVODE
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
 from dearig.model.coefficients import REST
 from dearig.model.effects import EFFECTS, EffectValues
-from dearig.model.excitation import Sequence
-from dearig.model.fitting.coarse_drive import coarse_drive_of
-from dearig.model.material import (
+from dearig.model.film.material import (
     STANDARD_GRAVITY,
     TABLE_3,
     THESIS_FILM,
     THESIS_LOAD,
     VACUUM_PERMITTIVITY,
 )
-from dearig.model.records import ActuatorRecord
+from dearig.model.fitting.coarse_drive import coarse_drive_of
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator, Drive, at_rest, initial_state, reading_of
+from dearig.model.simulation.excitation import Sequence
 from tests.tools.engine import NOISE, posed, typical
 
 STAIRCASE = 200.0  # the same of a record that is diagnosed

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dearig.model.actuator import Actuator, Drive
 from dearig.model.control import Learner, LearningSettings
+from dearig.model.simulation.actuator import Actuator, Drive
 from tests.tools.effect_cases import THESIS, numbers, with_effect
 from tests.tools.targets import path, task
 

@@ -23,7 +23,7 @@ from typing import Any
 from dearig.config.rigfile import RigFile
 from dearig.sim_backend.clock import PacedClock
 from dearig.sim_backend.daqmx.opening import open_device
-from dearig.sim_backend.daqmx.server import DaqmxServer
+from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
 from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from tests.benchmarks.ni_example_checks import CHECKS, Played
 

@@ -27,9 +27,9 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.drivers.gate import Prediction, admit
 from dearig.drivers.samples import Listed
-from dearig.model.actuator import Actuator, Drive
+from dearig.model.film.material import TABLE_3
 from dearig.model.kinematics import thinning
-from dearig.model.material import TABLE_3
+from dearig.model.simulation.actuator import Actuator, Drive
 from tests.benchmarks.bench_recording import peak_memory
 
 # s and Hz; three inputs at 333 kHz are the 1 MS/s of the card

@@ -20,10 +20,10 @@ import h5py
 import numpy as np
 
 from dearig.drivers.rig import Block, RigIdentity
-from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
 from dearig.recording import RecordingWriter, RunMetadata, open_recording
-from dearig.recording import writer as writer_module
-from dearig.recording.layout import LIBVER
+from dearig.recording.content.layout import LIBVER
+from dearig.recording.writing import writer as writer_module
 from tests.tools.recordings import CHANNELS, SEQUENCE, Clock
 
 THREE = (CHANNELS[0], CHANNELS[1], CHANNELS[3])

@@ -13,12 +13,12 @@ from collections import Counter
 
 import numpy as np
 
-from dearig.model.actuator import Actuator, Drive
-from dearig.model.excitation import THESIS_FREQUENCIES, Sequence
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network
 from dearig.model.fitting import identify
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network
-from dearig.model.measures import errors
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.measures import errors
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import THESIS_FREQUENCIES, Sequence
 
 RATE = 1000.0
 NOISE = 1e-6

@@ -11,7 +11,7 @@ import numpy as np
 
 from dearig.drivers.gate import GatedWaveform, Prediction, admit
 from dearig.drivers.settings import RigSettings, ThermometerSettings
-from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.amplifier import Amplifier
 from dearig.sim_backend.card import Card
 from dearig.sim_backend.factory import open_simulated_rig

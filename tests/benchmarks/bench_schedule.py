@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from dearig.batch.engines import LocalEngine
-from dearig.batch.fits import StudyOptions, Task, fit_task
-from dearig.batch.studies import Subject, study_recordings, subjects_of
+from dearig.batch.fits import StudyOptions, Subject, Task, fit_task
+from dearig.batch.studies import study_recordings, subjects_of
 from tests.benchmarks.bench_study import made, nothing
 from tests.tools.machine import cores_and_load
 

@@ -13,10 +13,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dearig.model.actuator import Drive
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.fitting.slow_noise import pink_density
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Drive
 from dearig.sim_backend.laser_noise import LaserNoise
 
 _STEP = 5e-3  # s

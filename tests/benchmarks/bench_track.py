@@ -52,7 +52,7 @@ import numpy as np
 
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.diagnose import diagnose_recordings
-from dearig.analysis.records import as_record
+from dearig.analysis.readings.record import as_record
 from dearig.analysis.track import track
 from dearig.analysis.track_target import limits_of, task_of
 from dearig.analysis.tracking import TrackedRun
@@ -63,7 +63,6 @@ from dearig.config.targetfile import LoadedTarget, target_of
 from dearig.drivers.settings import CardSettings
 from dearig.errors import SafetyStop
 from dearig.model import kernel
-from dearig.model.actuator import Actuator
 from dearig.model.control import invert
 from dearig.model.control.bands import low_pass
 from dearig.model.diagnosis import diagnose
@@ -72,7 +71,8 @@ from dearig.model.effects import EFFECTS
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.records import Record
+from dearig.model.readings.records import Record
+from dearig.model.simulation.actuator import Actuator
 from dearig.recording import open_recording
 from dearig.sim_backend.factory import plant_of
 from dearig.sim_backend.plant import Plant

@@ -21,9 +21,9 @@ from dearig.batch.changes import find_jumps, jump_penalty
 from dearig.batch.fits import parameter_columns
 from dearig.batch.numbers import parameter_of
 from dearig.batch.trends import find_trends
-from dearig.model.actuator import Actuator
+from dearig.model.film.material import Network
 from dearig.model.fitting import fit_shared
-from dearig.model.material import Network
+from dearig.model.simulation.actuator import Actuator
 from tests.tools.engine import PLAIN, record_of, thesis_drive
 from tests.tools.machine import cores_and_load
 from tests.tools.made_campaign import TRUTH, made_rows

@@ -31,12 +31,12 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block, RigIdentity
 from dearig.drivers.samples import Repeated
-from dearig.window.collector import Collector
-from dearig.window.live import Live
-from dearig.window.planner import make_preview
-from dearig.window.run_plots import RunPlots
-from dearig.window.session import Session
-from dearig.window.theme import LIGHT, apply, prepare_plots
+from dearig.window.jobs.collector import Collector
+from dearig.window.kit.theme import LIGHT, apply, prepare_plots
+from dearig.window.run.live import Live
+from dearig.window.run.plots import RunPlots
+from dearig.window.sequence.planner import make_preview
+from dearig.window.session.state import Session
 
 RATE = 1e6 / 3.0  # Hz: a million conversions a second over three inputs
 BLOCK = 0.1  # s

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.model.actuator import Actuator
 from dearig.model.control import TrackingTask
 from dearig.model.control.inversion import _Job
+from dearig.model.simulation.actuator import Actuator
 from dearig.sim_backend.truth.plant import TruthPlant
 
 __all__ = ["Truth"]

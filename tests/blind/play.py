@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 
 from dearig.acquisition.run import RunOptions, record
-from dearig.analysis.records import as_record
+from dearig.analysis.readings.record import as_record
 from dearig.config.rigfile import load_rig_file
 from dearig.config.sequencefile import load_sequence
 from dearig.config.toml_input import read_text
 from dearig.errors import DearigError
-from dearig.model.records import ActuatorRecord, counted
+from dearig.model.readings.records import ActuatorRecord, counted
 from dearig.recording import open_recording
 from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.streams import Streams

@@ -25,9 +25,9 @@ from dearig.drivers.settings import LaserSettings
 from dearig.errors import DearigError
 from dearig.recording import open_recording
 from dearig.sim_backend.clock import PacedClock
-from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.card.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
-from dearig.sim_backend.daqmx.server import DaqmxServer
+from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.keyence import SimulatedController
 from dearig.sim_backend.serial_port import serve_on_socket

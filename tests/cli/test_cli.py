@@ -20,7 +20,7 @@ from dearig.config.presets import PRESETS, VALIDATION_A, VALIDATION_B
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
 from dearig.drivers.settings import CardSettings
-from dearig.model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
+from dearig.model.film.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
 from dearig.recording import open_recording
 from tests.tools.command import (
     LOBE,

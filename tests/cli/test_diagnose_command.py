@@ -14,12 +14,12 @@ from dearig.analysis import diagnose as app_diagnose
 from dearig.config.modelfile import load_model, save_model
 from dearig.config.sequencefile import parse_sequence
 from dearig.errors import DiskFault, InstrumentFault, Interrupted, NotSafe, SafetyStop
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.results import Diagnosis
-from dearig.model.film import Strip
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network, Spring
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network, Spring
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from dearig.recording import open_recording
-from tests.report.test_page import check
+from tests.report.pages.test_page import check
 from tests.tools.command import (
     SHORT_PRESETS,
     dearig,

@@ -83,7 +83,7 @@ def test_folders_are_named_and_a_locked_one_is_told(
 
 
 def test_the_kernel_cache_is_named() -> None:
-    from dearig.model.jit import cache_folder
+    from dearig.model.compiled.jit import cache_folder
 
     assert str(cache_folder()) in items("kernels")["compiled kernels"]["found"]
 
@@ -117,7 +117,7 @@ def test_what_is_broken_does_not_end_the_examination(monkeypatch: pytest.MonkeyP
     def broken() -> Path:
         raise RuntimeError("numba is damaged")
 
-    monkeypatch.setattr("dearig.model.jit.cache_folder", broken)
+    monkeypatch.setattr("dearig.model.compiled.jit.cache_folder", broken)
     answer = done("doctor")
     assert "numba is damaged" in answer.out
     assert "plug-ins" in answer.out or "card" in answer.out

@@ -10,7 +10,7 @@ import threading
 import pytest
 
 from dearig.cli.last_words import leave
-from dearig.recording.recorder import _THREAD
+from dearig.recording.writing.recorder import _THREAD
 
 TALKATIVE = """
 import atexit, os, sys, warnings

@@ -11,8 +11,8 @@ import pytest
 
 from dearig.cli.options import SpringChoice, SpringKind
 from dearig.config.modelfile import SpringName, load_model, save_model
-from dearig.model.film import Strip
-from dearig.model.material import Network, Spring
+from dearig.model.film.material import Network, Spring
+from dearig.model.simulation.strip import Strip
 from dearig.model.springs import SPRINGS
 from tests.tools.command import dearig, done, refused
 

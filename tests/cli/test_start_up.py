@@ -77,7 +77,8 @@ def test_a_run_needs_no_filters_of_images() -> None:
     """``scipy`` itself is small: numba imports it, and its parts are loaded when they are used."""
     code = (
         "import sys, dearig.acquisition.overlay, dearig.acquisition.run, "
-        "dearig.analysis.compatibility; print(*sorted(m for m in sys.modules if m.count('.') == 1))"
+        "dearig.analysis.readings.compatibility; "
+        "print(*sorted(m for m in sys.modules if m.count('.') == 1))"
     )
     ended = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=200

@@ -13,7 +13,7 @@ from dearig.cli.terminal import branch_table, identify_table, validate_tables
 from dearig.errors import InputError
 from dearig.recording.json_file import write_json
 from dearig.report.as_json import outcome_json
-from dearig.report.numbers import significant
+from dearig.report.text.numbers import significant
 from tests.tools.reports import (
     actuator_comparison,
     film_comparison,

@@ -13,9 +13,7 @@ import pytest
 
 from dearig.config.modelfile import _File, load_model, save_model
 from dearig.errors import InputError
-from dearig.model.actuator import Actuator
-from dearig.model.film import Strip
-from dearig.model.material import (
+from dearig.model.film.material import (
     TABLE_3,
     THESIS_FILM,
     THESIS_LOAD,
@@ -25,6 +23,8 @@ from dearig.model.material import (
     Network,
     Spring,
 )
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from dearig.model.springs import SPRINGS
 
 STRANGE_FILM = Film(0.05, 0.04, 0.0005, 3.1, 970.0, "uniaxial")

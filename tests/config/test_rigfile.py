@@ -12,7 +12,7 @@ from dearig.drivers.contract.rig import foreseen
 from dearig.drivers.gate import admit
 from dearig.drivers.settings import LaserSettings, RigSettings, ThermometerSettings
 from dearig.errors import InputError
-from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from dearig.config.segments.levels import Hold
 from dearig.config.sequence_example import example, page
 from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.registry import ContractError
-from dearig.model.excitation import Segment
+from dearig.model.simulation.excitation import Segment
 from tests.tools.plugins import run_with_distribution
 
 WAVEFORM = "time_s,voltage_kV\n0,0\n1,3\n2,0\n"

@@ -17,7 +17,7 @@ from dearig.config.sequencefile import (
     read_sequence,
 )
 from dearig.errors import InputError
-from dearig.model.excitation import Sequence
+from dearig.model.simulation.excitation import Sequence
 
 HEAD = 'name = "x"\nlead_in_s = 0.1\ntail_s = 0.1\n'
 

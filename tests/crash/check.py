@@ -11,7 +11,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording import open_recording, recover
-from dearig.recording.opening import opened
+from dearig.recording.reading.opening import opened
 from dearig.recording.verify import verify
 from tests.tools.recording_victim import pattern
 

@@ -16,7 +16,7 @@ def test_labels_in_italics_are_labels_of_the_window(page: str) -> None:
     labels = set(re.findall(r"(?<!\*)\*([A-Z][^*]+)\*(?!\*)", text)) - TITLES
     sources = "".join(
         file.read_text(encoding="utf-8").replace("&", "")
-        for file in sorted((ROOT / "app" / "window").glob("*.py"))
+        for file in sorted((ROOT / "app" / "window").rglob("*.py"))
     )
     assert labels
     assert [label for label in sorted(labels) if " ".join(label.split()) not in sources] == []

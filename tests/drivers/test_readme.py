@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dearig.drivers.contract.laser import LaserContract
-from dearig.drivers.laser import LaserDriver
+from dearig.drivers.instruments.laser import LaserDriver
 from dearig.drivers.settings import LaserSettings
 
 README = Path(__file__).parents[2] / "drivers" / "README.md"

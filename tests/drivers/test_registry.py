@@ -13,15 +13,15 @@ import pytest
 from dearig.acquisition.check import check_rig
 from dearig.acquisition.rigs import RIGS, kind_of
 from dearig.config.rigfile import RigFile
-from dearig.drivers.instruments import INSTRUMENTS
+from dearig.drivers.instruments.registered import INSTRUMENTS
 from dearig.errors import InputError
 
 #: A distribution with a rig, a laser and an amplifier, all made of this program's own parts.
 ACME = """
 from dearig.drivers.keyence.driver import KeyenceDriver
-from dearig.drivers.findings import Finding
-from dearig.drivers.laser import LaserInspection
-from dearig.drivers.trek import TrekDriver
+from dearig.drivers.instruments.findings import Finding
+from dearig.drivers.instruments.laser import LaserInspection
+from dearig.drivers.instruments.trek import TrekDriver
 from dearig.sim_backend.kind import SimulatedKind
 
 
@@ -120,7 +120,7 @@ def test_address_of_no_rig_is_told_what_there_is():
 def test_what_cannot_be_used_is_left_out_with_a_sentence(installed):
     code = (
         "from dearig.acquisition.rigs import RIGS\n"
-        "from dearig.drivers.instruments import INSTRUMENTS\n"
+        "from dearig.drivers.instruments.registered import INSTRUMENTS\n"
         "print(*RIGS, *INSTRUMENTS)\nprint(*RIGS.left_out, *INSTRUMENTS.left_out, sep='\\n')"
     )
     names, *left_out = python(installed, "-c", code).stdout.splitlines()

@@ -23,8 +23,8 @@ import dearig.cli.main as command
 import dearig.sim_backend.rig as rigs
 from dearig.acquisition.run import record  # noqa: F401  (imported before the faults)
 from dearig.config.rigfile import RigFile
-from dearig.model.actuator import Actuator, Drive
-from dearig.model.material import TABLE_3
+from dearig.model.film.material import TABLE_3
+from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.sim_backend import factory  # noqa: F401  (imported before the faults)
 
 __all__ = ["KINDS", "SEQUENCE", "main"]

@@ -6,7 +6,7 @@ import random
 import struct
 from collections.abc import Sequence
 
-from dearig.recording.superblock import lookup3
+from dearig.recording.content.superblock import lookup3
 
 __all__ = ["mutated_bytes", "mutated_hdf5", "mutated_text"]
 

@@ -27,11 +27,11 @@ from dearig.config.sequencefile import load_sequence
 from dearig.config.targetfile import EXAMPLE, load_target
 from dearig.drivers.rig import Block
 from dearig.recording import RunMetadata, export_recording, open_recording, save_recording
-from dearig.recording.importers.choose import choose
+from dearig.recording.importers.columns.choose import choose
+from dearig.recording.importers.columns.specimen import Specimen
+from dearig.recording.importers.columns.values import values_of
 from dearig.recording.importers.registry import source_at
-from dearig.recording.importers.specimen import Specimen
-from dearig.recording.importers.values import values_of
-from dearig.report.campaign_page import campaign_json, campaign_summary, campaign_table
+from dearig.report.pages.campaign import campaign_json, campaign_summary, campaign_table
 from tests.fuzz.mutate import mutated_bytes, mutated_hdf5, mutated_text
 from tests.tools.command import LOBE, film_model, thesis_model
 from tests.tools.recordings import Clock, run_counts, write_run, writer

@@ -17,13 +17,13 @@ from dearig.drivers.channels import RESERVED_NAMES
 from dearig.drivers.contract.rig import lobes, play
 from dearig.drivers.interlocks import Interlocks, would_trip
 from dearig.drivers.rig import Block
-from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
 from dearig.recording import describe, describe_rows, export_recording, import_file, open_recording
-from dearig.recording.follow import Follower
-from dearig.recording.layout import UNITS
+from dearig.recording.content.layout import UNITS
+from dearig.recording.reading.follow import Follower
 from dearig.recording.verify import verify
 from dearig.sim_backend.factory import open_simulated_rig
-from tests.drivers.test_daqmx_rig import Bench
+from tests.drivers.daqmx.test_rig import Bench
 from tests.tools.command import dearig, done
 from tests.tools.recordings import Clock
 

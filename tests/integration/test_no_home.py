@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dearig.model.jit import cache_folder
+from dearig.model.compiled.jit import cache_folder
 from tests.tools.command import LOBE, thesis_model, write
 from tests.tools.recordings import write_run
 
@@ -73,7 +73,7 @@ def test_every_command_goes_on(tmp_path: Path, name: str) -> None:
 def test_without_any_place_for_a_cache_one_sentence_says_so(tmp_path: Path) -> None:
     """The kernels are then compiled in every command; here none is needed."""
     code = (
-        "import dearig.model.trusted_folder as t; t._temporary = lambda: iter(());"
+        "import dearig.model.compiled.trusted_folder as t; t._temporary = lambda: iter(());"
         "import sys; sys.argv = ['dearig', *sys.argv[1:]];"
         "from dearig.cli.main import main; main()"
     )

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from dearig.errors import InputError
 from dearig.recording import open_recording, recover
+from dearig.recording.content.layout import IDENTIFIER
+from dearig.recording.content.text import text_of
 from dearig.recording.json_file import write_json
-from dearig.recording.layout import IDENTIFIER
-from dearig.recording.opening import opened
-from dearig.recording.text import text_of
+from dearig.recording.reading.opening import opened
 from dearig.recording.verify import verify
 from tests.interleave.commands import Ended
 

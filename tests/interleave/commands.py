@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from dearig.cli.main import main
-from dearig.recording import writer as writing
-from dearig.recording.writer import RecordingWriter
+from dearig.recording.writing import writer as writing
+from dearig.recording.writing.writer import RecordingWriter
 from tests.tools.command import dearig, write
 
 __all__ = ["Command", "Ended", "plan", "play", "prepare"]

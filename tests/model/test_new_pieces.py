@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dearig.model.coefficients import EFFECTS_AT, REST
-from dearig.model.effects import sensor_delay, sensor_lag, thinning_drag, viscoplastic_flow
+from dearig.model.effects.library.mechanical import thinning_drag, viscoplastic_flow
+from dearig.model.effects.library.sensor import sensor_delay, sensor_lag
 from tests.tools.effect_cases import numbers
 
 

@@ -8,6 +8,9 @@ import pytest
 
 from dearig.model import springs
 from dearig.model.errors import ModelError
+from dearig.model.film.material import Branch, Network, Spring
+from dearig.model.film.network import network_stress, nominal_pull, nominal_pull_slope
+from dearig.model.film.specimen import KINEMATICS
 from dearig.model.kinematics import (
     directions,
     electric,
@@ -16,9 +19,6 @@ from dearig.model.kinematics import (
     strain_and_pull,
     thinning,
 )
-from dearig.model.material import Branch, Network, Spring
-from dearig.model.network import network_stress, nominal_pull, nominal_pull_slope
-from dearig.model.specimen import KINEMATICS
 from dearig.model.springs import SPRING_LAWS, SPRINGS, arruda_boyce
 from tests.tools.model_oracle import (
     invariant,

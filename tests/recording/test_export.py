@@ -13,7 +13,7 @@ from pyarrow import parquet
 from scipy.io import loadmat
 
 from dearig.errors import InputError
-from dearig.model.material import THESIS_FILM, Load
+from dearig.model.film.material import THESIS_FILM, Load
 from dearig.recording import (
     EXPORTS,
     Recording,

@@ -17,10 +17,10 @@ from dearig.drivers.rig import Block
 from dearig.errors import DiskFault, InputError
 from dearig.recording import RunMetadata, export_recording, open_recording, recover, save_recording
 from dearig.recording.files import check_output
-from dearig.recording.finish import finish
 from dearig.recording.json_file import write_json
 from dearig.recording.lock import create_locked, lock_existing
 from dearig.recording.verify import verify
+from dearig.recording.writing.finish import finish
 from tests.tools.command import names
 from tests.tools.recordings import Clock, run_counts, write_run, writer
 

@@ -13,9 +13,9 @@ import pytest
 
 from dearig.drivers.rig import Block
 from dearig.recording import RunMetadata, save_recording
-from dearig.recording.text import fixed
+from dearig.recording.content.text import fixed
 from dearig.recording.verify import verify
-from tests.recording.test_reader import attribute, film_values, removed, value
+from tests.recording.reading.test_reader import attribute, film_values, removed, value
 from tests.tools.command import dearig
 from tests.tools.recordings import IDENTITY, Clock, run_counts, write_run, writer
 

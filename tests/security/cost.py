@@ -106,15 +106,16 @@ def _import_commands() -> None:
         "dearig.acquisition.check", "dearig.acquisition.replay", "dearig.acquisition.run",
         "dearig.analysis.diagnose", "dearig.analysis.identify", "dearig.analysis.simulate",
         "dearig.analysis.validate", "dearig.api", "dearig.batch.notify",
-        "dearig.config.campaignfile", "dearig.recording.importers.mat_file",
-        "dearig.recording.importers.tdms_file", "dearig.recording.importers.text_file",
-        "dearig.recording.verify", "dearig.report.as_json", "dearig.report.diagnosis_page",
-        "dearig.report.html", "openpyxl", "pyqtgraph", "rich.progress", "rich.table",
+        "dearig.config.campaignfile", "dearig.recording.importers.formats.mat_file",
+        "dearig.recording.importers.formats.tdms_file",
+        "dearig.recording.importers.formats.text_file",
+        "dearig.recording.verify", "dearig.report.as_json", "dearig.report.pages.diagnosis",
+        "dearig.report.pages.html", "openpyxl", "pyqtgraph", "rich.progress", "rich.table",
     ):  # fmt: skip
         importlib.import_module(name)
     from dearig.cli.main import app
-    from dearig.model.actuator import Actuator
-    from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+    from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+    from dearig.model.simulation.actuator import Actuator
 
     Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3).rest()  # loads the compiler and its kernels
     with contextlib.redirect_stdout(io.StringIO()):

@@ -6,7 +6,7 @@ from scipy import signal, stats
 
 from dearig.drivers.errors import AddressError
 from dearig.drivers.settings import RigSettings
-from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.factory import open_simulated_rig, plant_of
 from dearig.sim_backend.laser_noise import NOISES, LaserNoise
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dearig.drivers.instruments.thermohygrometer import ThermohygrometerError
 from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
-from dearig.drivers.thermohygrometer import ThermohygrometerError
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.room import Air, SimulatedSource, still_air, time_in_room
 

@@ -23,8 +23,8 @@ from dearig.drivers.gate import admit
 from dearig.drivers.rig import RigState
 from dearig.drivers.settings import LaserSettings, RigSettings, ThermometerSettings
 from dearig.model import kernel
-from dearig.model.actuator import NO_AIR, Actuator, at_rest, initial_state
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load, Network
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load, Network
+from dearig.model.simulation.actuator import NO_AIR, Actuator, at_rest, initial_state
 from dearig.sim_backend.card import INPUT_OVERWRITTEN
 from dearig.sim_backend.clock import ManualClock, PacedClock
 from dearig.sim_backend.factory import open_simulated_rig

@@ -18,9 +18,9 @@ import numpy as np
 from dearig.cli.main import main
 from dearig.config.modelfile import save_model
 from dearig.config.presets import PRESETS
-from dearig.model.actuator import Actuator
-from dearig.model.film import Strip
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 
 #: A short run: one lobe of 3 kV, 1.5 s in all.
 LOBE = """\

@@ -26,7 +26,7 @@ from dearig.drivers.daqmx.certificates import Certificates
 from dearig.drivers.gate import GatedWaveform
 from dearig.sim_backend.clock import Clock, ManualClock
 from dearig.sim_backend.daqmx.opening import open_device
-from dearig.sim_backend.daqmx.server import DaqmxServer
+from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
 from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import FaultPlan

@@ -5,8 +5,8 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis import Diagnosis, diagnose
+from dearig.model.simulation.actuator import Actuator
 from tests.tools.engine import (
     PLAIN,
     effect,

@@ -8,7 +8,6 @@ import numpy as np
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, SeparatingExperiment, Stand
 from dearig.config.modelfile import ModelFile
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.results import (
     Candidate,
     Diagnosis,
@@ -16,11 +15,12 @@ from dearig.model.diagnosis.results import (
     Stage,
     Step,
 )
-from dearig.model.film import Strip
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.fitting import Estimate
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.model.measures import errors
+from dearig.model.readings.measures import errors
 from dearig.model.residual import Dependence, MissingStress, Signature, Unnamed
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from tests.tools.reports import ESTIMATES, NOISE, actuator_comparison, film_comparison
 
 LAG = (("sensor lag", (("time_constant", 9.5e-3),)),)

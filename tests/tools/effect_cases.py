@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dearig.model.actuator import Actuator
 from dearig.model.effects import EFFECTS
-from dearig.model.film import Strip
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from tests.tools.effect_oracle import limited
 
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)

@@ -14,7 +14,7 @@ from numpy.polynomial import Legendre
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from dearig.model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
+from dearig.model.film.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
 
 
 def pull(limit, e):

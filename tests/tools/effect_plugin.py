@@ -8,7 +8,7 @@ from pathlib import Path
 MODULE = '''"""A made effect."""
 
 from dearig.model.effects import Effect, Parameter
-from dearig.model.jit import jit
+from dearig.model.compiled.jit import jit
 
 EFFECT = Effect(
     name={name!r}, family="drag", acts_on="load", summary="a force against the motion",

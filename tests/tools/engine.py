@@ -9,16 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, Drive
 from dearig.model.diagnosis.fits import Fit
 from dearig.model.effects import EFFECTS, EffectValues
-from dearig.model.excitation import Sequence
-from dearig.model.film import Strip
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.slow_noise import WhitenedProblem
-from dearig.model.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
-from dearig.model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import Sequence
+from dearig.model.simulation.strip import Strip
 
 NOISE = 1e-6
 ONE = Network.gent((45e3, 60e3), (1e4, 1e4), (0.4,))

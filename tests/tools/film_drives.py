@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dearig.model.actuator import Actuator, Drive
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.simulation.actuator import Actuator, Drive
 from tests.tools.model_oracle import solve
 
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)

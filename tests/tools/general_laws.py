@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from dearig.model.coefficients import EFFECTS_AT, REST
 from dearig.model.effects import EFFECTS, PLACES
-from dearig.model.excitation import Sequence
+from dearig.model.simulation.excitation import Sequence
 from tests.tools.effect_cases import THESIS, numbers
 from tests.tools.effect_oracle import Film
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from dearig.batch.journal import JOURNAL
 from dearig.batch.watching import seen
 from dearig.errors import InputError
-from dearig.recording.opening import read_from
-from dearig.recording.reader import open_recording
-from dearig.recording.text import text_of
+from dearig.recording.content.text import text_of
+from dearig.recording.reading.opening import read_from
+from dearig.recording.reading.reader import open_recording
 from tests.tools.command import LOBE, SLOW_RIG, write
 
 PLAN = """\

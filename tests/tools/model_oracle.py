@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import odeint
 from scipy.optimize import brentq
 
-from dearig.model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
+from dearig.model.film.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
 
 
 def langevin_inverse(x):

@@ -11,7 +11,7 @@ import pytest
 
 from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block, Event, Instrument, RigIdentity
-from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
 from dearig.recording import RecordingWriter, RunMetadata
 
 VOLTS_PER_COUNT = 10.0 / 32768

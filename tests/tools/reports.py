@@ -15,12 +15,12 @@ from dearig.analysis.outcomes import (
     ValidateOutcome,
 )
 from dearig.config.modelfile import ModelFile
-from dearig.model.actuator import Actuator
-from dearig.model.excitation import Sequence
-from dearig.model.film import Strip
+from dearig.model.film.material import TABLE_3, THESIS_FILM, Load, Network
 from dearig.model.fitting import Estimate, Identification
-from dearig.model.material import TABLE_3, THESIS_FILM, Load, Network
-from dearig.model.measures import errors
+from dearig.model.readings.measures import errors
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.excitation import Sequence
+from dearig.model.simulation.strip import Strip
 
 NOISE = 1e-6
 TABLE_4 = ((5.8484, 6.9696), (8.8924, 2.4462), (5.8952, 3.8678), (8.7797, 5.8924), (5.9604, 3.8877))

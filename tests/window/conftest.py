@@ -24,11 +24,11 @@ from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import LimitsSettings
-from dearig.window.frame import MainWindow
-from dearig.window.planner import Planner
-from dearig.window.run_page import RunPage
-from dearig.window.session import Session
-from dearig.window.theme import LIGHT, prepare_plots
+from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.run.page import RunPage
+from dearig.window.sequence.planner import Planner
+from dearig.window.session.state import Session
+from dearig.window.shell.frame import MainWindow
 
 # the offscreen platform says this of every window that it shows, and means nothing by it
 _ALLOWED = ("This plugin does not support propagateSizeHints()",)
@@ -103,7 +103,7 @@ class Answers:
 @pytest.fixture
 def answers(monkeypatch: pytest.MonkeyPatch) -> Answers:
     given = Answers()
-    monkeypatch.setattr("dearig.window.questions.ask", given)
+    monkeypatch.setattr("dearig.window.documents.questions.ask", given)
     return given
 
 

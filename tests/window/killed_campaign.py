@@ -32,12 +32,12 @@ from dearig.batch.watching import seen
 from dearig.config.rigfile import load_rig_file
 from dearig.recording import open_recording
 from dearig.sim_backend.clock import PacedClock
-from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.card.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
-from dearig.sim_backend.daqmx.server import DaqmxServer
-from dearig.window.document import TextFile
-from dearig.window.session import Session
-from dearig.window.theme import LIGHT, prepare_plots
+from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
+from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.session.state import Session
+from dearig.window.session.text_file import TextFile
 from tests.window.real_window import Hand, end, shown, until
 
 RIG = """\

@@ -15,9 +15,9 @@ from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QEvent, QEventLoop, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QWidget
 
-from dearig.window.frame import MainWindow
-from dearig.window.session import Session
-from dearig.window.theme import LIGHT, prepare_plots
+from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.session.state import Session
+from dearig.window.shell.frame import MainWindow
 
 PATIENCE = 120_000  # ms
 KEYSYMS = {

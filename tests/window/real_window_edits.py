@@ -13,8 +13,8 @@ from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QWidget
 
-from dearig.window.session import Session
-from dearig.window.theme import LIGHT, prepare_plots
+from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.session.state import Session
 from tests.window.real_window import Hand, shown, until
 
 SEQUENCE = """\

@@ -16,10 +16,10 @@ from PySide6.QtCore import QEvent, QObject, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from dearig.config.rigfile import RigFile
-from dearig.window.frame import MainWindow
-from dearig.window.hv import HighVoltage
-from dearig.window.session import Session
-from dearig.window.theme import LIGHT, prepare_plots
+from dearig.window.high_voltage.state import HighVoltage
+from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.session.state import Session
+from dearig.window.shell.frame import MainWindow
 from tests.window.conftest import SHORT
 from tests.window.real_window import Hand, end, until
 

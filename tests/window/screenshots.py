@@ -24,10 +24,10 @@ from dearig.acquisition.run import RunOptions, record
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
-from dearig.window.document import TextFile
-from dearig.window.frame import MainWindow
-from dearig.window.session import Session
-from dearig.window.theme import LIGHT, prepare_plots
+from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.session.state import Session
+from dearig.window.session.text_file import TextFile
+from dearig.window.shell.frame import MainWindow
 from tests.window.real_window import end
 
 SIZES = ((1366, 768), (1920, 1080))

@@ -80,7 +80,7 @@ RUN = """\
 import signal
 from PySide6.QtCore import QTimer
 import dearig.window.main as main
-from dearig.window.frame import MainWindow
+from dearig.window.shell.frame import MainWindow
 shown = MainWindow.show
 def show(self):
     shown(self)

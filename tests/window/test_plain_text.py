@@ -14,13 +14,13 @@ from pytestqt.qtbot import QtBot
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.report.study_view import view_of
-from dearig.window.frame import MainWindow
-from dearig.window.session import Session
-from dearig.window.theme import LIGHT, prepare_plots
-from dearig.window.widgets import label
+from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.kit.widgets import label
+from dearig.window.session.state import Session
+from dearig.window.shell.frame import MainWindow
 from tests.report.test_study_file import made as study_on_paper
 from tests.tools.diagnosis import diagnose_outcome
-from tests.window.recordings import made
+from tests.window.made_recordings import made
 from tests.window.shown_text import cut_off, rendered_markup, unreadable
 
 TAG, WITHIN = "<b>", "bold"

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from dearig.recording import open_recording
-from dearig.recording.marks import marks_in
+from dearig.recording.reading.marks import marks_in
 
 pytestmark = [
     pytest.mark.slow,

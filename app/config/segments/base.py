@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from dearig.config.toml_input import Table
-from dearig.model.excitation import Segment
+from dearig.model.simulation.excitation import Segment
 
 __all__ = ["KV", "SEGMENTS_MAX", "Positive", "SegmentTable", "Voltage", "in_volts"]
 

@@ -13,11 +13,11 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.config.toml_input import parse_toml
 from dearig.drivers.registry import ContractError
 from dearig.errors import InputError
-from dearig.model.excitation import Segment
+from dearig.model.simulation.excitation import Segment
 
 __all__ = ["check_segment"]
 
-#: V: segments join within this (``dearig.model.excitation``).
+#: V: segments join within this (``dearig.model.simulation.excitation``).
 _JOIN = 1e-3
 _POINTS = 1001
 

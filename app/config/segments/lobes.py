@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from dearig.config.segments.base import KV, Positive, SegmentTable, Voltage
-from dearig.model import excitation
-from dearig.model.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES, Segment
+from dearig.model.simulation import excitation
+from dearig.model.simulation.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES, Segment
 
 __all__ = ["HalfSine", "Thesis", "Triangle"]
 

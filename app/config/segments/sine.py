@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from dearig.config.segments.base import KV, Positive, SegmentTable, Voltage
-from dearig.model import excitation
-from dearig.model.excitation import Segment
+from dearig.model.simulation import excitation
+from dearig.model.simulation.excitation import Segment
 
 __all__ = ["Sine"]
 

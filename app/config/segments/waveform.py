@@ -12,11 +12,11 @@ from pydantic import Field
 from dearig.config.segments.base import KV, SegmentTable
 from dearig.config.toml_input import NAME_MAX, shown
 from dearig.errors import InputError
-from dearig.model import excitation
-from dearig.model.excitation import Segment
+from dearig.model.simulation import excitation
+from dearig.model.simulation.excitation import Segment
+from dearig.recording.content.timestamps import not_forward
+from dearig.recording.importers.formats.text_file import TextFile
 from dearig.recording.importers.source import listing
-from dearig.recording.importers.text_file import TextFile
-from dearig.recording.timestamps import not_forward
 
 __all__ = ["Csv"]
 

@@ -14,7 +14,7 @@ from dearig.drivers.registry import Registry
 from dearig.errors import InputError
 from dearig.recording.exporters.table import Exporter
 from dearig.recording.files import check_output, replaced_when_done
-from dearig.recording.reader import open_recording
+from dearig.recording.reading.reader import open_recording
 
 __all__ = ["EXPORTS", "Exporter", "export_recording"]
 

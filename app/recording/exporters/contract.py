@@ -12,7 +12,7 @@ from dearig.drivers.registry import ContractError
 from dearig.recording.exporters import export_recording
 from dearig.recording.exporters.table import columns_of
 from dearig.recording.importers import IMPORTERS, import_file
-from dearig.recording.reader import open_recording
+from dearig.recording.reading.reader import open_recording
 
 __all__ = ["check_exporter"]
 

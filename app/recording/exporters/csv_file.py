@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dearig.recording.exporters.table import Exporter, columns_of
-from dearig.recording.recording import Recording
+from dearig.recording.reading.recording import Recording
 
 __all__ = ["EXPORTER"]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dearig.extras import import_extra
 from dearig.recording.exporters.table import Exporter, columns_of, description_of, units_of
-from dearig.recording.recording import Recording
+from dearig.recording.reading.recording import Recording
 
 __all__ = ["EXPORTER"]
 

@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dearig.recording.layout import FORMAT, LINEAR, ZERO_ORDER
-from dearig.recording.recording import Recording
+from dearig.recording.content.layout import FORMAT, LINEAR, ZERO_ORDER
+from dearig.recording.reading.recording import Recording
 
 __all__ = ["Exporter", "columns_of", "description_of", "units_of"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from dearig.model.errors import ModelError
-from dearig.model.specimen import KINEMATICS, Film, Load
-from dearig.recording.layout import FORMAT, ZERO_ORDER
+from dearig.model.film.specimen import KINEMATICS, Film, Load
+from dearig.recording.content.layout import FORMAT, ZERO_ORDER
 
 __all__ = ["Exported", "exported"]
 

@@ -11,22 +11,22 @@ from threading import Event as Flag
 
 from dearig.drivers.rig import Event
 from dearig.errors import InputError
-from dearig.model.specimen import KINEMATICS, Film, Load
+from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.progress import Progress, part, quiet
-from dearig.recording.assumed import ASSUMED, FILM_VALUES, assumed_of
+from dearig.recording.content.assumed import ASSUMED, FILM_VALUES, assumed_of
+from dearig.recording.content.metadata import RunMetadata
+from dearig.recording.content.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
 from dearig.recording.files import check_output, file_sha256
-from dearig.recording.importers.choose import choose
-from dearig.recording.importers.chosen import Chosen, command_line
+from dearig.recording.importers.columns.choose import choose
+from dearig.recording.importers.columns.chosen import Chosen, command_line
+from dearig.recording.importers.columns.plausible import doubts
+from dearig.recording.importers.columns.specimen import Specimen
+from dearig.recording.importers.columns.values import Values, values_of
 from dearig.recording.importers.exported import exported
-from dearig.recording.importers.plausible import doubts
+from dearig.recording.importers.quantities.units import Scale
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import NeedsOptionError
-from dearig.recording.importers.specimen import Specimen
-from dearig.recording.importers.units import Scale
-from dearig.recording.importers.values import Values, values_of
-from dearig.recording.metadata import RunMetadata
-from dearig.recording.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
-from dearig.recording.save import save_recording
+from dearig.recording.writing.save import save_recording
 
 __all__ = ["ImportOptions", "Imported", "Prepared", "UnsureError", "import_file", "prepare"]
 
@@ -317,7 +317,7 @@ def _of_actuator(
     if kinematics is not None:
         if film is None:
             # imports the effects and their compiler, which other commands do without
-            from dearig.model.material import THESIS_FILM
+            from dearig.model.film.material import THESIS_FILM
 
             film = THESIS_FILM
             noted[ASSUMED] = ", ".join(FILM_VALUES)

@@ -13,14 +13,14 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.progress import Progress, part, quiet
-from dearig.recording.importers.choose import choose
-from dearig.recording.importers.chosen import Chosen, label_in, own_name
-from dearig.recording.importers.columns import Overview
+from dearig.recording.importers.columns.choose import choose
+from dearig.recording.importers.columns.chosen import Chosen, label_in, own_name
+from dearig.recording.importers.columns.specimen import Specimen, specimen_told
+from dearig.recording.importers.formats.columns import Overview
 from dearig.recording.importers.importing import OPENED
+from dearig.recording.importers.quantities.units import Scale
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import Source, part_of, printable
-from dearig.recording.importers.specimen import Specimen, specimen_told
-from dearig.recording.importers.units import Scale
 
 __all__ = ["ColumnPreview", "Content", "Guessed", "Proposal", "content_of", "preview"]
 

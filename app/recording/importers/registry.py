@@ -17,13 +17,13 @@ __all__ = ["IMPORTERS", "source_at"]
 
 _OWN = MappingProxyType(
     {
-        "csv": "dearig.recording.importers.text_file:IMPORTER",
-        "xlsx": "dearig.recording.importers.excel_file:IMPORTER",
-        "json": "dearig.recording.importers.json_file:IMPORTER",
-        "h5": "dearig.recording.importers.hdf5_file:IMPORTER",
-        "mat": "dearig.recording.importers.mat_file:IMPORTER",
-        "parquet": "dearig.recording.importers.parquet_file:IMPORTER",
-        "tdms": "dearig.recording.importers.tdms_file:IMPORTER",
+        "csv": "dearig.recording.importers.formats.text_file:IMPORTER",
+        "xlsx": "dearig.recording.importers.formats.excel_file:IMPORTER",
+        "json": "dearig.recording.importers.formats.json_file:IMPORTER",
+        "h5": "dearig.recording.importers.formats.hdf5_file:IMPORTER",
+        "mat": "dearig.recording.importers.formats.mat_file:IMPORTER",
+        "parquet": "dearig.recording.importers.formats.parquet_file:IMPORTER",
+        "tdms": "dearig.recording.importers.formats.tdms_file:IMPORTER",
     }
 )
 

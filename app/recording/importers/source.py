@@ -11,7 +11,7 @@ from typing import Protocol, cast
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.importers.labels import suggestion
+from dearig.recording.importers.quantities.labels import suggestion
 
 __all__ = [
     "PARSER_FAILURES",

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.plumbing import relaxing
 from dearig.sim_backend.truth.sampling import log_uniform

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers
 from dearig.sim_backend.truth.sampling import log_uniform

@@ -23,7 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.plant import Air
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import COURSE_ELECTRIC, COURSE_STIFFNESS, FilmNumbers

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import Course, TruthEffect
 from dearig.sim_backend.truth.film import COURSE_ELECTRIC, COURSE_PULL
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform

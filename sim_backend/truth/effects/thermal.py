@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.plant import Air
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import COURSE_HEATING, COURSE_STIFFNESS, FilmNumbers

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers
 from dearig.sim_backend.truth.plumbing import relaxing

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effect import Stage, TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers

@@ -28,7 +28,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import COURSE_HEATING, COURSE_STIFFNESS, FilmNumbers
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform

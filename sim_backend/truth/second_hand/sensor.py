@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from dearig.model.material import Load
+from dearig.model.film.material import Load
 from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.plumbing import looking_back, tones

@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dearig.model.actuator import Actuator
 from dearig.model.control import HoldController, HoldSettings, sensitivity_of
 from dearig.model.errors import ModelError
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.model.stability import static_stretch
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.stability import static_stretch
 
 HOLD = HoldSettings(
     setpoint=0.5e-3, sensitivity=1e-3, period=0.1, delay=0.6, response=2.0, authority=0.1,

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dearig.model.actuator import Drive
 from dearig.model.control import TrackingTask, VoltageLimits, invert, readings_under
 from dearig.model.control.linear import repeatable_part
 from dearig.model.errors import ModelError
-from dearig.model.stability import pull_in_voltage, static_stretch
+from dearig.model.simulation.actuator import Drive
+from dearig.model.simulation.stability import pull_in_voltage, static_stretch
 from tests.tools.effect_cases import BY_VOLTAGE, THESIS, numbers, with_effect
 from tests.tools.targets import LEAD_IN, LIMITS, RATE, TAIL, path, task
 

@@ -9,9 +9,9 @@ from scipy.signal import lsim, lti
 from dearig.acquisition.prediction import PredictedFilm
 from dearig.drivers.gate import Limits, admit
 from dearig.drivers.samples import Listed
-from dearig.model.actuator import Drive
 from dearig.model.control import Learner, LearningSettings, TrackingTask, VoltageLimits
 from dearig.model.errors import ModelError
+from dearig.model.simulation.actuator import Drive
 from tests.tools.effect_cases import THESIS, numbers, with_effect
 from tests.tools.targets import LEAD_IN, RATE, TAIL, path, task
 

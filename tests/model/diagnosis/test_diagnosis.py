@@ -11,14 +11,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from dearig.model.actuator import Actuator, Drive
 from dearig.model.diagnosis import Diagnosis, diagnose
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
-from dearig.model.excitation import Sequence
-from dearig.model.material import TABLE_3, Network
-from dearig.model.records import ActuatorRecord
+from dearig.model.film.material import TABLE_3, Network
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import Sequence
 from dearig.model.verdict import (
     EXPLAINED,
     NOTHING_MISSING,

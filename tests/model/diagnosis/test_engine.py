@@ -8,17 +8,17 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from dearig.model.actuator import Drive
 from dearig.model.diagnosis import diagnose, engine
 from dearig.model.diagnosis.fits import Fitter
 from dearig.model.diagnosis.preparation import has_line_at_rest
 from dearig.model.diagnosis.race import race
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
+from dearig.model.film.material import Network
 from dearig.model.fitting import identify
-from dearig.model.material import Network
-from dearig.model.noise import noise_at_rest
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.noise import noise_at_rest
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Drive
 from tests.tools.diagnoses import HIDDEN, of_hidden, plant
 from tests.tools.engine import (
     PLAIN,

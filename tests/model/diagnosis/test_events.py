@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dearig.model.actuator import Drive
 from dearig.model.diagnosis.events import drifts_at_rest, own_of
-from dearig.model.noise import noise_at_rest
-from dearig.model.records import ActuatorRecord, counted
+from dearig.model.readings.noise import noise_at_rest
+from dearig.model.readings.records import ActuatorRecord, counted
+from dearig.model.simulation.actuator import Drive
 from tests.tools.engine import NOISE, PLAIN, effect, pink_noise, record_of, thesis_drive
 
 KINDS = {

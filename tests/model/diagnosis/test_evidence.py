@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.slow_noise import Drift, DriftSpace, WhitenedProblem, drift_modes
+from dearig.model.simulation.actuator import Actuator
 from tests.tools.engine import PLAIN, record_of, typical
 
 SETTINGS = DiagnosisSettings()

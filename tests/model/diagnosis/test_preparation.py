@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from dearig.model.actuator import Drive
 from dearig.model.diagnosis.preparation import without_spikes, without_tails
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Drive
 
 N, QUIET = 4000, 400
 TIME = 5e-3 * np.arange(N)

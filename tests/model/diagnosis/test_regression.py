@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.least_squares import bounded
 from dearig.model.diagnosis.regression import Regression, Start
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import extent_of, shape_points
 from dearig.model.effects import EFFECTS
-from dearig.model.film import Strip
-from dearig.model.records import Record
+from dearig.model.readings.records import Record
+from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from tests.tools.engine import (
     NOISE,
     PLAIN,

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dearig.model.diagnosis.spring_choice import choose_springs
-from dearig.model.film import Strip
+from dearig.model.film.material import Network, Spring
 from dearig.model.fitting import identify
-from dearig.model.material import Network, Spring
-from dearig.model.records import FilmRecord
+from dearig.model.readings.records import FilmRecord
+from dearig.model.simulation.strip import Strip
 
 MU = 80e3
 

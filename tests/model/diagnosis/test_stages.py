@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.fits import Fit
 from dearig.model.diagnosis.stages import with_drift
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.slow_noise import Drift, DriftSpace, WhitenedProblem, drift_basis
+from dearig.model.simulation.actuator import Actuator
 from tests.tools.engine import NOISE, PLAIN, record_of
 
 

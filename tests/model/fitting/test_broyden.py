@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from dearig.model.film.material import Network
 from dearig.model.fitting.broyden import boxed_step, descend_broyden
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.material import Network
 from tests.tools.engine import PLAIN, effect, record_of
 
 TRUTH = replace(PLAIN, effects=effect("linear drag", drag=400.0))

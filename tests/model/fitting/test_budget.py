@@ -11,9 +11,9 @@ import pytest
 from dearig.model.fitting import GivenValue, Identification, identify, with_budget
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Estimate
-from dearig.model.records import counted
+from dearig.model.readings.records import counted
 from dearig.report.as_json import outcome_json
-from dearig.report.tables import parameter_table
+from dearig.report.text.tables import parameter_table
 from tests.tools.engine import PLAIN, posed, record_of, thesis_drive
 from tests.tools.reports import fit as paper_fit
 from tests.tools.reports import identify_outcome

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dearig.model import kernel
-from dearig.model.actuator import Drive, reading_of
-from dearig.model.excitation import Chirp, Lobes, Ramp, Sequence, Steps
+from dearig.model.film.material import Branch, Network, Spring
 from dearig.model.fitting.broyden import descend_broyden
 from dearig.model.fitting.coarse_drive import coarse_drive_of
 from dearig.model.fitting.levenberg import descend
-from dearig.model.material import Branch, Network, Spring
+from dearig.model.simulation.actuator import Drive, reading_of
+from dearig.model.simulation.excitation import Chirp, Lobes, Ramp, Sequence, Steps
 from tests.tools.engine import NOISE, PLAIN, effect, posed, record_of, typical
 
 RATE = 200.0

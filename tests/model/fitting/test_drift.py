@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from dearig.model.actuator import Drive
 from dearig.model.effects import EFFECTS, PLACES
 from dearig.model.fitting.drift import record_drift
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Drive
 from tests.tools.engine import NOISE, PLAIN, effect, masked, record_of, typical
 
 DRIFTS = [name for name, e in EFFECTS.items() if e.drift_basis is not None]

@@ -11,8 +11,8 @@ from dearig.model.fitting.estimates import estimates_with_intervals, recentre
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Estimate
 from dearig.model.fitting.problem import Problem
-from dearig.report.diagnosis import estimate_table
-from dearig.report.tables import parameter_table
+from dearig.report.text.diagnosis import estimate_table
+from dearig.report.text.tables import parameter_table
 from tests.tools.engine import PLAIN, effect, posed, record_of, thesis_drive
 from tests.tools.reports import fit as paper_fit
 

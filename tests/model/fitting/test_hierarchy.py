@@ -11,10 +11,10 @@ import pytest
 from scipy.optimize import least_squares
 
 from dearig.model.errors import ModelError
+from dearig.model.film.material import Load, Network
 from dearig.model.fitting.hierarchy import fit_shared
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.material import Load, Network
 from tests.tools.engine import PLAIN, record_of, thesis_drive
 
 #: Factors of mu_0 and of the permittivity of each record: a film on three days.

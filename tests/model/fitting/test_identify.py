@@ -11,10 +11,16 @@ import numpy as np
 import pytest
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, Drive
 from dearig.model.errors import ModelError
-from dearig.model.excitation import Sequence
-from dearig.model.film import Strip
+from dearig.model.film.material import (
+    TABLE_3,
+    THESIS_FILM,
+    THESIS_LOAD,
+    Branch,
+    Load,
+    Network,
+    Spring,
+)
 from dearig.model.fitting import identify
 from dearig.model.fitting.intervals import (
     correlation_time,
@@ -28,8 +34,10 @@ from dearig.model.fitting.parallel import parallel_map
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Algorithm1, algorithm_1
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Load, Network, Spring
-from dearig.model.records import ActuatorRecord, FilmRecord
+from dearig.model.readings.records import ActuatorRecord, FilmRecord
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import Sequence
+from dearig.model.simulation.strip import Strip
 from tests.tools.engine import effect, typical
 
 # the package exports the function of the same name

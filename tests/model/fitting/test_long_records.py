@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dearig.model.excitation import Steps
 from dearig.model.fitting import identify
 from dearig.model.fitting.estimates import estimates_with_intervals
 from dearig.model.fitting.intervals import firm_directions, linear_widths
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.thinning import thinned
+from dearig.model.simulation.excitation import Steps
 from tests.model.fitting.test_thinning import dense
 from tests.tools.engine import PLAIN, effect, posed, record_of, thesis_drive
 

@@ -11,7 +11,7 @@ from dearig.model.fitting.intervals import covariance
 from dearig.model.fitting.offsets import Offsets, centred
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.records import counted
+from dearig.model.readings.records import counted
 from tests.tools.engine import PLAIN, masked, posed, record_of
 
 LEAD_IN = 150

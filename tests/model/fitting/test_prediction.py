@@ -10,7 +10,7 @@ import pytest
 from dearig.model.fitting import identify
 from dearig.model.fitting.parameters import NORMAL_95
 from dearig.model.fitting.prediction import prediction_error
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
 from tests.tools.engine import PLAIN, record_of, thesis_drive
 
 

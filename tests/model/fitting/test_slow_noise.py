@@ -9,7 +9,6 @@ import pytest
 from scipy.linalg import sqrtm
 from scipy.stats import multivariate_normal
 
-from dearig.model.actuator import Drive
 from dearig.model.diagnosis.fits import Fitter
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.fitting.parameters import Layout
@@ -21,7 +20,8 @@ from dearig.model.fitting.slow_noise import (
     late_basis,
     pink_density,
 )
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Drive
 from tests.tools.engine import PLAIN, masked, pink_noise, record_of, thesis_drive
 
 MODES = 6

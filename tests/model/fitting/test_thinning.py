@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dearig.model import kernel
-from dearig.model.actuator import Drive, reading_of
 from dearig.model.diagnosis.fits import Fitter
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from dearig.model.excitation import Chirp, Lobes, Ramp, Sequence, Steps
 from dearig.model.fitting.thinning import thinned
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Drive, reading_of
+from dearig.model.simulation.excitation import Chirp, Lobes, Ramp, Sequence, Steps
 from tests.tools.engine import NOISE, PLAIN, masked
 
 RATE = 1000.0  # a rig file's own

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from dearig.model.actuator import initial_state
 from dearig.model.kernel.motion import spring_table
 from dearig.model.kernel.rk4 import rk4_steps
 from dearig.model.kernel.rodas import rodas_step
+from dearig.model.simulation.actuator import initial_state
 from tests.tools.film_drives import THESIS
 
 

@@ -9,18 +9,7 @@ from hypothesis import strategies as st
 
 from dearig.model import coefficients as at
 from dearig.model import kernel
-from dearig.model.actuator import (
-    NO_AIR,
-    Actuator,
-    Drive,
-    at_rest,
-    ends_of,
-    initial_state,
-    reading_of,
-)
-from dearig.model.excitation import Sequence
-from dearig.model.fitting.parameters import THESIS_RANGES
-from dearig.model.material import (
+from dearig.model.film.material import (
     TABLE_3,
     THESIS_FILM,
     THESIS_LOAD,
@@ -30,7 +19,18 @@ from dearig.model.material import (
     Network,
     Spring,
 )
-from dearig.model.network import HEAD
+from dearig.model.film.network import HEAD
+from dearig.model.fitting.parameters import THESIS_RANGES
+from dearig.model.simulation.actuator import (
+    NO_AIR,
+    Actuator,
+    Drive,
+    at_rest,
+    ends_of,
+    initial_state,
+    reading_of,
+)
+from dearig.model.simulation.excitation import Sequence
 from tests.tools.film_drives import (
     LENGTH,
     THESIS,

@@ -4,13 +4,20 @@ import numpy as np
 import pytest
 
 from dearig.model import kernel
-from dearig.model.actuator import NO_AIR, Actuator, Drive, at_rest, initial_state, reading_of
 from dearig.model.effects import assembly
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from dearig.model.kernel.exponential_rk import exponential_steps, film_table
 from dearig.model.kernel.motion import network_stiffness, spring_table
 from dearig.model.kernel.propagator import PROPAGATOR, fill_propagator
 from dearig.model.kernel.rk4 import rk4_steps
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
+from dearig.model.simulation.actuator import (
+    NO_AIR,
+    Actuator,
+    Drive,
+    at_rest,
+    initial_state,
+    reading_of,
+)
 from tests.tools.film_drives import LENGTH, ticks
 
 SOME_EFFECTS = (

@@ -4,9 +4,9 @@ import pytest
 
 from dearig.model import coefficients as at
 from dearig.model import kernel
-from dearig.model.actuator import Actuator
-from dearig.model.material import TABLE_3, THESIS_FILM, Load, Network, Spring
-from dearig.model.network import HEAD
+from dearig.model.film.material import TABLE_3, THESIS_FILM, Load, Network, Spring
+from dearig.model.film.network import HEAD
+from dearig.model.simulation.actuator import Actuator
 from tests.tools.film_drives import LENGTH, THESIS
 from tests.tools.model_oracle import balance
 

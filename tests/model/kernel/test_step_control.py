@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, Drive, reading_of, readings_of
 from dearig.model.effects import EFFECTS
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.simulation.actuator import Actuator, Drive, reading_of, readings_of
 from tests.tools.engine import typical
 from tests.tools.film_drives import LENGTH, ticks
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dearig.model.material import THESIS_FILM, Network
+from dearig.model.film.material import THESIS_FILM, Network
 from dearig.model.residual.missing_stress import missing_stress
 from tests.tools.engine import (
     NOISE,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dearig.config.sequencefile import load_sequence
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.laser_noise import NOISES
 from dearig.sim_backend.truth import cases
 from dearig.sim_backend.truth.effects import drift

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 from scipy.integrate import solve_ivp
 
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.truth import film
 from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effects import end_stop, interference, loose_contact, sudden, thermal

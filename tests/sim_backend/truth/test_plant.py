@@ -5,8 +5,16 @@ import pytest
 
 from dearig.drivers.contract.rig import lobes, play
 from dearig.drivers.settings import RigSettings
-from dearig.model.actuator import Actuator
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load, Network, Spring
+from dearig.model.film.material import (
+    TABLE_3,
+    THESIS_FILM,
+    THESIS_LOAD,
+    Film,
+    Load,
+    Network,
+    Spring,
+)
+from dearig.model.simulation.actuator import Actuator
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.model_plant import ModelPlant
 from dearig.sim_backend.streams import Streams

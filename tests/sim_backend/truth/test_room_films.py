@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from dearig.drivers.settings import RoomSettings
-from dearig.model.actuator import Actuator, Drive
 from dearig.model.effects import EFFECTS
-from dearig.model.effects.contract import values_of
-from dearig.model.environment import CELSIUS, HUMIDITY
-from dearig.model.excitation import Sequence
+from dearig.model.effects_contract import values_of
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.model.records import ActuatorRecord
+from dearig.model.readings.environment import CELSIUS, HUMIDITY
+from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.excitation import Sequence
 from dearig.sim_backend.room import Air, still_air
 from dearig.sim_backend.truth.cases import ROOM_FORMS, draw
 from dearig.sim_backend.truth.effects import humidity, thermal

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 from scipy.integrate import solve_ivp
 
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth import second_laws
 from dearig.sim_backend.truth.film import FilmNumbers, rest_stretch

@@ -1,0 +1,1 @@
+"""What a recording's file holds, piece by piece, and how each is stored."""

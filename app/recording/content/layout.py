@@ -1,0 +1,250 @@
+"""Layout of a recording file: names, units and types.
+
+/                       format, default="entry"
+/entry                  NXentry: format, kind, complete, outcome, samples, default="data"
+                        after a run: output_state (confirmed, commanded, unknown), with
+                        output_state_time, output_set_by (run, guardian), output_monitor_V
+/entry/title, start_time, end_time
+/entry/entry_identifier_uuid   identifies the recording, whatever its file is called
+/entry/data             NXdata: time and the physical values, and beside them NAME_counts
+                        also of the channels that the rig file declares, by their names
+/entry/instrument/*     one NXinstrument for each instrument; channels/NAME links to the counts
+/entry/sample           NXsample: film and load
+/entry/sequence         TOML (runs only)
+/entry/model            TOML of the live overlay (when there was one)
+/entry/events           sample, time, level, message
+/entry/wall_clock       sample, unix_time: the computer's clock at every flush (runs only)
+/entry/environment      sample, unix_time, temperature (degC), relative_humidity (%): readings of a
+                        thermo-hygrometer, NaN where it gave none (runs with one only); the means
+                        of a run are attributes of /entry: temperature_degC, and
+                        relative_humidity_percent
+/entry/pyramid/*        minima and maxima of the counts over bins (runs only)
+/entry/checksums        CRC-32 of the counts (runs only)
+/entry/overview         NXdata: minima and maxima of the physical values of a long run
+/entry/provenance       versions, configuration and its hash, seed, host, operator
+                        of a hold also feedback (TOML)
+"""
+
+from __future__ import annotations
+
+import uuid
+from datetime import UTC, datetime
+from types import MappingProxyType
+
+import h5py
+import numpy as np
+
+from dearig.recording.content.text import fixed, put_text
+
+__all__ = [
+    "ENVIRONMENT_TYPE",
+    "EVENT_LEVELS",
+    "EVENT_TYPE",
+    "FORMAT",
+    "FORMAT_NAME",
+    "IDENTIFIER",
+    "KINDS",
+    "LIBVER",
+    "LINEAR",
+    "MESSAGE_BYTES",
+    "REQUIRED",
+    "SIGNALS",
+    "UNITS",
+    "WALL_CLOCK_TYPE",
+    "ZERO_ORDER",
+    "attach_time",
+    "counts_name",
+    "create_field",
+    "declared_names",
+    "describe_field",
+    "iso_time",
+    "lay_out",
+    "make_own_scale",
+    "variable_attributes",
+]
+
+FORMAT_NAME = "dearig-recording"
+FORMAT = f"{FORMAT_NAME}/1"
+
+#: The only library version with which a file survived a kill at every write boundary in tests.
+LIBVER = ("v110", "v110")
+
+#: Samples in a chunk of physical values, at most.
+CHUNK = 2**17
+
+#: The two kinds: a film driven by voltage, and a film specimen driven by stretch.
+KINDS = ("actuator", "film")
+
+#: Measured quantity of each kind: the default plot, and the target of a model.
+SIGNALS = MappingProxyType({"actuator": "displacement", "film": "nominal_stress"})
+
+#: Values that a recording of each kind must have.
+REQUIRED = MappingProxyType(
+    {
+        "actuator": ("time", "displacement", "voltage_command"),
+        "film": ("time", "stretch", "nominal_stress"),
+    }
+)
+
+#: Units of the physical values under /entry/data.
+UNITS = MappingProxyType(
+    {
+        "time": "s",
+        "displacement": "m",
+        "voltage_command": "V",
+        "voltage_monitor": "V",
+        "current_monitor": "A",
+        "temperature": "degC",
+        "displacement_model": "m",
+        "stretch": "1",
+        "nominal_stress": "Pa",
+    }
+)
+
+LONG_NAMES = MappingProxyType(
+    {
+        "displacement": "displacement from the loaded rest state",
+        "voltage_command": "voltage at the film, commanded",
+        "voltage_monitor": "voltage at the film, monitored",
+        "current_monitor": "current, monitored",
+        "displacement_model": "displacement, live model",
+        "nominal_stress": "nominal stress",
+    }
+)
+
+#: Name of the recording's identifier in /entry, as NeXus has it.
+IDENTIFIER = "entry_identifier_uuid"
+
+#: Interpolation of the voltage between samples: a converter holds it, imported data are linear.
+ZERO_ORDER, LINEAR = "zero-order", "linear"
+
+EVENT_LEVELS = ("info", "warning", "fault")
+MESSAGE_BYTES = 480
+EVENT_TYPE = np.dtype(
+    [
+        ("sample", "<i8"),
+        ("time", "<f8"),
+        ("level", h5py.string_dtype("utf-8", 8)),
+        ("message", h5py.string_dtype("utf-8", MESSAGE_BYTES)),
+    ]
+)
+
+#: The computer's clock and the sample clock: number of samples at a Unix time in s.
+WALL_CLOCK_TYPE = np.dtype([("sample", "<i8"), ("unix_time", "<f8")])
+
+#: A reading of a thermo-hygrometer before a sample: Unix time in s, degrees Celsius, per cent.
+ENVIRONMENT_TYPE = np.dtype(
+    [
+        ("sample", "<i8"),
+        ("unix_time", "<f8"),
+        ("temperature", "<f8"),
+        ("relative_humidity", "<f8"),
+    ]
+)
+
+
+def counts_name(channel: str) -> str:
+    """Return the name of the raw counts of ``channel``."""
+    return f"{channel}_counts"
+
+
+def iso_time(moment: float) -> str:
+    """Return the Unix time ``moment`` in s as ISO 8601 in UTC."""
+    return datetime.fromtimestamp(moment, tz=UTC).isoformat(timespec="milliseconds")
+
+
+def declared_names(data: h5py.Group) -> tuple[str, ...]:
+    """Return the names of the channels in /entry/data that the rig file declared, in their order.
+
+    They have counts like the others, and an attribute ``declared`` with their place in the order.
+    """
+    suffix = counts_name("")
+    found = []
+    for name in data:
+        if name.endswith(suffix) and name.removesuffix(suffix) not in UNITS:
+            attrs = data[name].attrs
+            if "declared" in attrs:
+                found.append((int(attrs["declared"]), name.removesuffix(suffix)))
+    return tuple(name for _, name in sorted(found))
+
+
+def variable_attributes(name: str, unit: str = "", label: str = "") -> dict[str, str]:
+    """Return ``units`` of the physical values ``name`` and, where there is one, ``long_name``.
+
+    ``unit`` and ``label`` are those of a channel that the rig file declared.
+    """
+    found = {"units": UNITS.get(name, unit)}
+    if long_name := LONG_NAMES.get(name, label):
+        found["long_name"] = long_name
+    return found
+
+
+def describe_field(dataset: h5py.Dataset, name: str, unit: str = "", label: str = "") -> None:
+    """Write ``units`` of a physical dataset and, where the channel has one, a ``long_name``."""
+    found = variable_attributes(name, unit, label)
+    for key, text in found.items():
+        # viewers show the long name in place of name and unit
+        with_unit = f"{text} ({found['units']})" if key == "long_name" else text
+        dataset.attrs[key] = fixed(with_unit)
+
+
+def create_field(
+    data: h5py.Group, name: str, samples: int, unit: str = "", label: str = ""
+) -> h5py.Dataset:
+    """Make the physical dataset ``name``, to be filled; HDF5 keeps a checksum of every chunk.
+
+    ``unit`` and ``label`` are those of a channel that the rig file declared.
+    """
+    dataset = data.create_dataset(
+        name,
+        shape=(samples,),
+        dtype="<f8",
+        # chunks of equal size: HDF5 stores the last one in full
+        chunks=(-(-samples // -(-samples // CHUNK)),) if samples else None,
+        fletcher32=bool(samples),
+    )
+    describe_field(dataset, name, unit, label)
+    return dataset
+
+
+def attach_time(data: h5py.Group) -> None:
+    """Make ``time`` the dimension scale of every row in ``data`` that has its length.
+
+    With it xarray finds the time coordinate. SWMR mode forbids the attributes that this writes, so
+    it is done when a run is finished, which is also when ``time`` is written.
+    """
+    time = data["time"]
+    time.make_scale("time")
+    for name, row in data.items():
+        if name != "time" and row.shape == time.shape:
+            row.dims[0].attach_scale(time)
+
+
+def make_own_scale(rows: h5py.Dataset) -> None:
+    """Make a table under /entry a dimension scale, so that its dimension has a name.
+
+    xarray warns of nameless dimensions in every group above the one that it opens. For a table that
+    grows in SWMR mode this must be done when it is created.
+    """
+    rows.make_scale(rows.name.rpartition("/")[2])
+
+
+def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Group:
+    """Create the root, /entry and an empty /entry/data of a new file; return /entry."""
+    file.attrs["NX_class"] = fixed("NXroot")
+    file.attrs["format"] = fixed(FORMAT)
+    file.attrs["default"] = fixed("entry")
+    entry = file.create_group("entry")
+    entry.attrs["NX_class"] = fixed("NXentry")
+    entry.attrs["format"] = fixed(FORMAT)
+    entry.attrs["default"] = fixed("data")
+    entry.attrs["kind"] = fixed(kind)
+    entry.attrs["complete"] = False
+    put_text(entry, "title", title)
+    put_text(entry, "start_time", iso_time(started))
+    put_text(entry, IDENTIFIER, str(uuid.uuid4()))
+    data = entry.create_group("data")
+    data.attrs["NX_class"] = fixed("NXdata")
+    data.attrs["signal"] = fixed(SIGNALS[kind])
+    data.attrs["axes"] = fixed(["time"])
+    return entry

@@ -1,0 +1,109 @@
+"""Provenance of a recording: program versions, configuration, host, operator."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import shutil
+import subprocess
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from dearig.recording.content.layout import iso_time
+from dearig.recording.content.metadata import RunMetadata
+from dearig.recording.content.text import fixed, put_text, text_of
+
+__all__ = [
+    "CONTINUES",
+    "gather",
+    "git_revision",
+    "installed_version",
+    "read_provenance",
+    "write_provenance",
+]
+
+ROOT = Path(__file__).resolve().parents[3]
+
+#: Name of the text with the path of the recording that a recording continues. It has no lead-in:
+#: its displacement is counted from that of the other.
+CONTINUES = "continues"
+
+#: Characters; longer texts are datasets, because an HDF5 attribute holds 64 KB at most.
+LONGEST_ATTRIBUTE = 1000
+
+
+def git_revision(root: Path = ROOT) -> str:
+    """Return the git revision at ``root``, with ``-dirty`` if files changed; "" if none."""
+    git = shutil.which("git")
+    # git would also find the repository of a parent folder, which is not that of this program
+    if git is None or not (root / ".git").exists():
+        return ""
+    command = [git, "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40"]
+    command += ["--exclude=*"]
+    try:
+        answer = subprocess.run(  # noqa: S603  (fixed arguments, no shell)
+            command, capture_output=True, text=True, timeout=5.0, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return answer.stdout.strip() if answer.returncode == 0 else ""
+
+
+def installed_version() -> str:
+    """Return the version of the installed package, "unknown" where it is not installed."""
+    try:
+        return version("dearig")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def gather(started: float, metadata: RunMetadata) -> dict[str, object]:
+    """Return the provenance of a recording that was started at the Unix time ``started`` in s."""
+    found: dict[str, object] = {
+        "start_time": iso_time(started),
+        "operator": metadata.operator,
+        "host": platform.node(),
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "dearig_version": installed_version(),
+        "git_revision": git_revision(),
+        "python_version": platform.python_version(),
+        "numpy_version": np.__version__,
+        "h5py_version": h5py.__version__,
+        "hdf5_version": h5py.version.hdf5_version,
+        "configuration": metadata.configuration,
+        "configuration_sha256": hashlib.sha256(metadata.configuration.encode("utf-8")).hexdigest(),
+    }
+    if metadata.seed is not None:
+        found["seed"] = metadata.seed
+    return found | dict(metadata.provenance)
+
+
+def write_provenance(entry: h5py.Group, provenance: Mapping[str, object]) -> None:
+    """Write ``provenance`` (texts, numbers and booleans) to ``entry/provenance``."""
+    group = entry.create_group("provenance")
+    group.attrs["NX_class"] = fixed("NXcollection")
+    for name, value in provenance.items():
+        if name == "configuration" or len(str(value)) > LONGEST_ATTRIBUTE:
+            put_text(group, name, str(value))
+        elif isinstance(value, bool | int | float):
+            group.attrs[name] = value
+        else:
+            group.attrs[name] = fixed(str(value))
+
+
+def read_provenance(group: h5py.Group) -> dict[str, object]:
+    """Return ``entry/provenance`` as plain texts, numbers and booleans."""
+    found: dict[str, object] = {}
+    for name, value in group.attrs.items():
+        if name == "NX_class":
+            continue
+        plain = isinstance(value, np.number | np.bool_)
+        found[name] = value.item() if plain else text_of(value)
+    for name, item in group.items():
+        if isinstance(item, h5py.Dataset):
+            found[name] = text_of(item[()])
+    return found

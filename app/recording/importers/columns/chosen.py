@@ -1,0 +1,97 @@
+"""Columns that are chosen for the quantities of a recording."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+from dearig.recording.importers.quantities.labels import Label, Target, label_of
+from dearig.recording.importers.quantities.units import Scale
+from dearig.recording.importers.source import Source
+
+__all__ = ["LIKELY", "Chosen", "Pick", "command_line", "label_in", "own_name"]
+
+#: Unit of a column whose name has none, in a proposal, by dimension.
+LIKELY = MappingProxyType(
+    {"time": "s", "voltage": "kV", "length": "mm", "force": "N", "stress": "MPa", "current": "mA",
+     "temperature": "C", "strain": "1", "stretch": "1"}
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A column that was chosen for a quantity, and the scale to the unit of a recording."""
+
+    target: Target
+    column: str
+    scale: Scale
+    behind: str = ""  # what stands behind the column in a command line, such as *FACTOR
+    #: what of it is a guess: "column", "unit" or "scale"; "" where it is sure
+    doubt: str = ""
+
+    @property
+    def said(self) -> str:
+        """What was taken for what, for a message."""
+        target = self.target
+        unit = "in V at the card" if target.raw else f"in {target.unit}"
+        unit = "without unit" if target.unit == "1" else unit
+        scaled = f", scaled {self.behind}" if self.behind else ""
+        return f"{target.quantity.replace('_', ' ')} {unit} from {self.column!r}{scaled}"
+
+
+@dataclass
+class Chosen:
+    """Columns of a source by quantity, and what was not sure.
+
+    ``unsure`` are sentences: while there is one, nothing may be imported. ``notes`` say what was
+    found without being asked for. ``optional`` are quantities that a recording can do without, and
+    that nobody asked for. ``table_choices`` are the tables of which one must be chosen.
+    """
+
+    source: Source
+    picked: dict[str, Pick] = field(default_factory=dict)
+    table: str | None = None
+    table_choices: tuple[str, ...] = ()
+    optional: set[str] = field(default_factory=set)
+    unsure: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def pairs(self) -> dict[str, str]:
+        """Columns by target, as ``--column TARGET=COLUMN`` gives them."""
+        return {pick.target.name: pick.column + pick.behind for pick in self.picked.values()}
+
+
+def command_line(
+    path: Path, out: Path, pairs: Mapping[str, str], table: str | None, more: Sequence[str] = ()
+) -> str:
+    """Return the command line that imports the columns ``pairs`` of the file at ``path``."""
+    words = ["dearig", "import", str(path), "--out", str(out)]
+    for target, column in pairs.items():
+        words += ["--column", f"{target}={column}"]
+    if table is not None:
+        words += ["--table", table]
+    return shlex.join([*words, *more])
+
+
+def own_name(source: Source, column: str) -> str:
+    """Return the name of ``column`` without the group or path that its format puts before it."""
+    strip = getattr(source, "own_name", None)
+    name = column if strip is None else strip(column)
+    return re.sub(r" #\d+$", "", name)  # of a name that is there twice
+
+
+def label_in(source: Source, column: str) -> Label:
+    """Return what the name of ``column``, or else what its file says of it, tells."""
+    units: Mapping[str, str] = getattr(source, "units", {})
+    labels: Mapping[str, str] = getattr(source, "labels", {})
+    unit = units.get(column, "")
+    found = label_of(own_name(source, column), unit)
+    if found.quantities or found.raw or not labels.get(column):
+        return found
+    told = label_of(labels[column], unit)
+    return told if told.quantities or told.raw or not found.unit else found

@@ -1,0 +1,124 @@
+"""Plausibility of imported values: sentences about what looks like a wrong unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from dearig.model.film.specimen import Film
+
+__all__ = ["doubts"]
+
+#: Largest free length of an actuator film on a bench, m; used where the film is not known.
+LONGEST_FILM = 0.5
+#: Correlation of displacement and squared voltage beyond which the sign is sure. It is 0.7 to 1 for
+#: films with creep, friction or drift under sines, lobes and chirps, and near 0 for noise alone.
+SIGN_SURE = 0.5
+#: Samples from which that correlation is computed, at most.
+THINNED = 2**17
+
+
+def _span(values: np.ndarray) -> float:
+    return float(values.max() - values.min())
+
+
+def _largest(values: np.ndarray) -> float:
+    """Return the largest absolute value of ``values`` (n,)."""
+    return max(float(values.max()), -float(values.min()))
+
+
+def _shared_sign(voltage: np.ndarray, displacement: np.ndarray) -> float:
+    """Return the correlation of displacement with the square of the voltage, from -1 to 1.
+
+    The Maxwell stress goes with the square, so the sign of the voltage does not matter. 0 where
+    one of the two does not change.
+    """
+    # a part of the samples tells as much
+    thinned = slice(None, None, max(-(-voltage.size // THINNED), 1))
+    voltage, displacement = voltage[thinned], displacement[thinned]
+    # relative to the largest: no square overflows
+    drive = (voltage / max(_largest(voltage), 1e-300)) ** 2
+    pull = drive - drive.mean()
+    moved = displacement - displacement.mean()
+    size = float(np.linalg.norm(pull) * np.linalg.norm(moved))
+    return float(pull @ moved) / size if size > 0.0 else 0.0
+
+
+def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
+    """Return a sentence for each of ``values`` (in the recording's units) that is doubtful."""
+    found = []
+
+    def check(name: str, wrong: bool, sentence: str) -> None:
+        if name in values and wrong:
+            found.append(sentence)
+
+    if "displacement" in values:
+        span = _span(values["displacement"])
+        longest, whose = (
+            (film.length, "the film is") if film else (LONGEST_FILM, "a film is hardly")
+        )
+        check(
+            "displacement",
+            span > longest,
+            f"displacement spans {span * 1e3:.4g} mm and {whose} {longest * 1e3:.4g} mm long; "
+            f"is its unit right?",
+        )
+        check(
+            "displacement",
+            span < 1e-7,
+            f"displacement spans {span * 1e6:.4g} um only; is its unit right?",
+        )
+    if {"displacement", "voltage_command"} <= values.keys():
+        share = _shared_sign(values["voltage_command"], values["displacement"])
+        check(
+            "displacement",
+            share < -SIGN_SURE,
+            "displacement falls where the voltage rises: is its sign right? A film gets longer "
+            "under voltage, so its displacement grows",
+        )
+    if "voltage_command" in values:
+        highest = _largest(values["voltage_command"])
+        check(
+            "voltage_command",
+            highest > 30e3,
+            f"voltage reaches {highest * 1e-3:.4g} kV; is it in V and not in kV?",
+        )
+        check("voltage_command", highest == 0.0, "voltage never leaves 0 V")
+        check(
+            "voltage_command",
+            0.0 < highest < 30.0,
+            f"voltage reaches {highest:.4g} V only; is it in kV?",
+        )
+    if "current_monitor" in values:
+        highest = _largest(values["current_monitor"])
+        check(
+            "current_monitor",
+            highest > 1.0,
+            f"current reaches {highest:.4g} A, which no high-voltage amplifier gives; "
+            f"is its unit right?",
+        )
+    if "temperature" in values:
+        low, high = float(values["temperature"].min()), float(values["temperature"].max())
+        check(
+            "temperature",
+            low < -100.0 or high > 150.0,
+            f"temperature lies between {low:.4g} and {high:.4g} degC; is its unit right?",
+        )
+    if "stretch" in values:
+        low, high = float(values["stretch"].min()), float(values["stretch"].max())
+        check(
+            "stretch",
+            low < 0.2 or high > 15.0,
+            f"stretch lies between {low:.4g} and {high:.4g}; is it length over length at rest, "
+            f"and the gauge length right?",
+        )
+        check("stretch", low == high, "stretch never changes")
+    if "nominal_stress" in values:
+        highest = _largest(values["nominal_stress"])
+        check(
+            "nominal_stress",
+            highest > 1e8 or 0.0 < highest < 10.0,
+            f"nominal stress reaches {highest * 1e-3:.4g} kPa; are its unit and the area right?",
+        )
+    return found

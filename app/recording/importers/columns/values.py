@@ -1,0 +1,392 @@
+"""Values of a recording from the columns that were chosen."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from dearig.errors import InputError
+from dearig.recording.content.timestamps import not_forward
+from dearig.recording.importers.columns.chosen import Chosen, Pick
+from dearig.recording.importers.columns.specimen import Specimen, specimen_told
+from dearig.recording.importers.quantities.clock_numbers import by_sixties
+from dearig.recording.importers.quantities.labels import names_of, suggestion
+from dearig.recording.importers.source import GapError, NeedsOptionError, listing
+
+__all__ = ["Values", "values_of"]
+
+#: Where the optional columns go, by quantity.
+OPTIONAL = MappingProxyType(
+    {
+        "voltage_monitor": "voltage_monitor",
+        "current": "current_monitor",
+        "temperature": "temperature",
+    }
+)
+#: Time in s above which a first time stamp counts from a fixed day, not from the start of a run.
+LONG_AGO = 1e7
+
+
+@dataclass
+class Values:
+    """Values (n,) of a recording of some ``kind``, by their names in it.
+
+    ``left`` are the places of rows that were left out, by the sample before which they stood.
+    ``warnings`` are doubts and ``notes`` what was done to the values.
+    """
+
+    kind: str
+    columns: dict[str, np.ndarray]
+    left: dict[int, list[str]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def values_of(
+    chosen: Chosen, specimen: Specimen, rate_Hz: float | None, skip_bad_rows: bool
+) -> Values:
+    """Return the values of the columns in ``chosen``, in the units of a recording.
+
+    ``rate_Hz`` makes the time of a file that has none. Raises ``InputError`` for what no recording
+    can be.
+    """
+    values = Values(_kind(chosen), {}, notes=list(chosen.notes))
+    values.notes += getattr(chosen.source, "notes", ())
+    if values.kind == "actuator":
+        if "force" in chosen.picked:
+            values.warnings.append("the force was not used: actuator data have none")
+        if specimen != Specimen():
+            values.warnings.append("gauge length and area are for film data, and were not used")
+        if "displacement" not in chosen.picked:
+            raise _no_column(chosen, "displacement")
+        found = _read(chosen, values, ["time", "voltage", "displacement", *OPTIONAL], rate_Hz,
+                      skip_bad_rows)  # fmt: skip
+        values.columns = {
+            "time": found["time"],
+            "displacement": found["displacement"],
+            "voltage_command": found["voltage"],
+        } | {OPTIONAL[q]: found[q] for q in OPTIONAL if q in found}
+        return values
+    wanted = ["time", "temperature", *_film_columns(chosen, specimen, values)]
+    found = _read(chosen, values, wanted, rate_Hz, skip_bad_rows)
+    if "strain" in found:
+        found["stretch"] = 1.0 + found.pop("strain")
+    if specimen.gauge_length_mm is not None and "displacement" in found:
+        found["stretch"] = 1.0 + found.pop("displacement") / (specimen.gauge_length_mm / 1e3)
+    if specimen.area_mm2 is not None and "force" in found:
+        found["nominal_stress"] = found.pop("force") / (specimen.area_mm2 / 1e6)
+    low = np.flatnonzero(found["stretch"] <= 0.0)
+    if low.size:
+        raise InputError(
+            f"{chosen.source.path}, {chosen.source.row(int(low[0]))}: stretch is "
+            f"{found['stretch'][low[0]]:.6g}; it is length over length at rest, and above 0"
+        )
+    values.columns = found
+    return values
+
+
+def _kind(chosen: Chosen) -> str:
+    there = chosen.picked.keys()
+    path = chosen.source.path
+    film = [q for q in ("stretch", "strain", "nominal_stress") if q in there]
+    if "voltage" in there and film:
+        raise InputError(
+            f"{path} has both voltage and {' and '.join(film)}: actuator data are driven by "
+            f"voltage, film data by stretch; import a file with the columns of one"
+        )
+    if "voltage" in there:
+        if "displacement" not in there and "force" in there:
+            raise InputError(
+                f"{path} has voltage and force and no displacement: the force of a blocked film is "
+                f"not modelled here; actuator data need the displacement"
+            )
+        return "actuator"
+    if film or "force" in there:
+        return "film"
+    raise InputError(
+        f"{path} has no column for voltage ({names_of('voltage')}), nor for film data "
+        f"({names_of('stretch')}, {names_of('strain')}, {names_of('nominal_stress')}, "
+        f"{names_of('force')}); there are: {listing(chosen.source.names)}"
+        f"{suggestion(['voltage_kV', 'stretch'], chosen.source.names)}"
+    )
+
+
+def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[str, str]:
+    """Return the quantities that stretch and stress come from.
+
+    Raises ``NeedsOptionError`` for a size of the specimen that is missing, for both at once.
+    """
+    there, told = chosen.picked, specimen_told(getattr(chosen.source, "block", ()))
+    length = next((q for q in ("stretch", "strain", "displacement") if q in there), None)
+    pull = next((q for q in ("nominal_stress", "force") if q in there), None)
+    if length is None:
+        raise _no_column(chosen, "stretch", "or displacement with --gauge-length-mm")
+    if pull is None:
+        raise _no_column(chosen, "nominal_stress", "or force_N with --area-mm2")
+    missing, words = [], []
+    if length == "displacement" and specimen.gauge_length_mm is None:
+        missing.append(
+            f"displacement and no stretch; give the specimen's length at rest with "
+            f"--gauge-length-mm{_hint(chosen, 'length')}"
+        )
+        words += ["--gauge-length-mm", _typed(told.gauge_length_mm, "LENGTH")]
+    if pull == "force" and specimen.area_mm2 is None:
+        missing.append(
+            f"force and no nominal stress; give the specimen's cross-section at rest with "
+            f"--area-mm2{_hint(chosen, 'width', 'thickness', 'section')}"
+        )
+        words += ["--area-mm2", _typed(told.area_mm2, "AREA")]
+    if missing:
+        raise NeedsOptionError(f"{chosen.source.path} has {'; and '.join(missing)}", *words)
+    if length != "displacement" and specimen.gauge_length_mm is not None:
+        values.warnings.append(f"the gauge length was not used: there is a column of {length}")
+    if pull != "force" and specimen.area_mm2 is not None:
+        values.warnings.append("the area was not used: there is a column of nominal stress")
+    return length, pull
+
+
+def _typed(value: float | None, unknown: str) -> str:
+    return unknown if value is None else f"{value:g}"
+
+
+def _hint(chosen: Chosen, *words: str) -> str:
+    """Return what the lines above the table say of the specimen, for a message."""
+    block: Sequence[Sequence[str]] = getattr(chosen.source, "block", ())
+    said = [" ".join(row) for row in block if row and any(word in row[0].lower() for word in words)]
+    return f"; the file says: {listing(said)}" if said else ""
+
+
+def _no_column(chosen: Chosen, quantity: str, otherwise: str = "") -> InputError:
+    """Return the error for a quantity that no column has."""
+    return InputError(
+        f"{chosen.source.path} has no column for {quantity} "
+        f"({names_of(quantity)}{', ' if otherwise else ''}{otherwise}); there are: "
+        f"{listing(chosen.source.names)}"
+        f"{suggestion([quantity], chosen.source.names)}"
+    )
+
+
+def _read(
+    chosen: Chosen,
+    values: Values,
+    quantities: list[str],
+    rate_Hz: float | None,
+    skip: bool,
+) -> dict[str, np.ndarray]:
+    """Return the checked values of ``quantities`` that exist, in the recording's units."""
+    source = chosen.source
+    path = source.path
+    picked = {q: chosen.picked[q] for q in quantities if q in chosen.picked}
+    columns = [pick.column for pick in picked.values()]
+    step = _step(chosen, columns, rate_Hz)
+    raw = _read_columns(chosen, picked, values)
+    columns = [pick.column for pick in picked.values()]
+    sizes = {column: raw[column].size for column in columns}
+    size = min(sizes.values())
+    if getattr(source, "cut_short", False):
+        values.warnings.append(
+            f"the file ends early: it was not closed, or not copied as a whole; its columns have "
+            f"{size} to {max(sizes.values())} values, and the first {size} of each are imported"
+        )
+    elif len(set(sizes.values())) > 1:
+        different = ", ".join(f"{column} {n}" for column, n in sizes.items())
+        raise InputError(f"{path}: the columns have different lengths: {different}")
+    table = {q: raw[pick.column][:size] for q, pick in picked.items()}
+    if step is not None:
+        if not step * size < float("inf"):
+            raise InputError(f"{path}: {step!r} s from row to row is too long")
+        table["time"] = step * np.arange(size)
+        said = getattr(source, "step_from", "") if rate_Hz is None else ""
+        values.notes.append(
+            f"time is counted from the first row, {step:.9g} s from row to row"
+            f"{said and f', as {said} says'}"
+        )
+    _leave_gaps(chosen, picked, table, values)
+    names = (
+        {q: pick.column for q, pick in picked.items()}
+        | {"time": "time"}
+        | {q: pick.column for q, pick in picked.items() if q == "time"}
+    )
+    good = _good_rows(chosen, table, names, skip)
+    if not good.all():
+        table = {q: column[good] for q, column in table.items()}
+    if "time" in picked:
+        table["time"] = _counted_by_sixties(chosen, picked["time"], table["time"], values)
+    found = {
+        q: picked[q].scale.apply(column) if q in picked else column for q, column in table.items()
+    }
+    if found["time"].size < 2:
+        raise InputError(f"{path} has {found['time'].size} row of data; at least 2 are needed")
+    first = float(found["time"][0])
+    if abs(first) > LONG_AGO:
+        found["time"] = found["time"] - first
+        values.notes.append(f"time is counted from the first time stamp, {first:.3f} s")
+    _note_left_out(chosen, values, good)
+    return found
+
+
+def _counted_by_sixties(chosen: Chosen, pick: Pick, time: np.ndarray, values: Values) -> np.ndarray:
+    """Return ``time`` (n,) in the unit of ``pick``; 40.59 min may be 40 min and 59 s.
+
+    Changes the notes. Raises ``NeedsOptionError`` where the column's unit is none of which sixty
+    make the next. A scale that the user gave says that the numbers are plain.
+    """
+    if pick.behind or (counted := by_sixties(time)) is None:
+        return time
+    unit, part = pick.target.unit, {"min": "seconds", "h": "minutes"}.get(pick.target.unit)
+    carried = int(np.flatnonzero(np.diff(np.round(100.0 * time) % 100.0) < 0.0)[0])
+    seen = f"{time[carried + 1]:.2f} follows {time[carried]:.2f}"
+    plain = shlex.quote(f"{pick.target.name}={pick.column}*1")
+    if part is not None:
+        values.notes.append(
+            f"{pick.column!r} is read as {'minutes' if unit == 'min' else 'hours'} and {part}: "
+            f"{seen}, and its steps are even only so; --column {plain} reads plain numbers"
+        )
+        return counted / 60.0
+    step = float(np.median(np.diff(counted)))
+    raise NeedsOptionError(
+        f"{chosen.source.path}: {pick.column!r} is in {unit}, but its values seem to be minutes "
+        f"and seconds: {seen}, and its steps are even only so; give the rate, or --column {plain} "
+        f"if they are plain numbers",
+        "--rate-Hz",
+        f"{1.0 / step:.9g}",
+    )
+
+
+def _read_columns(chosen: Chosen, picked: dict[str, Pick], values: Values) -> dict[str, np.ndarray]:
+    """Return the columns ``picked``, without optional ones that have gaps.
+
+    Changes ``picked`` and the notes.
+    """
+    source = chosen.source
+    while True:
+        optional = {picked[q].column: q for q in chosen.optional if q in picked}
+        if hasattr(source, "optional"):
+            source.optional = frozenset(optional)
+        try:
+            return source.read([pick.column for pick in picked.values()])
+        except GapError as error:
+            _leave_out(chosen, picked, optional[error.column], str(error), values)
+
+
+def _leave_gaps(
+    chosen: Chosen, picked: dict[str, Pick], table: dict[str, np.ndarray], values: Values
+) -> None:
+    """Leave out optional columns that have no number where all others have one.
+
+    Changes ``picked``, ``table`` and the notes.
+    """
+    optional = [q for q in chosen.optional if q in table]
+    if not optional:
+        return
+    good = np.ones(table["time"].size, dtype=bool)
+    for quantity in table.keys() - set(optional):
+        good &= np.isfinite(table[quantity])
+    for quantity in optional:
+        gaps = good & ~np.isfinite(table[quantity])
+        if gaps.any():
+            at = int(np.argmax(gaps))
+            where = f"{chosen.source.row(at)}: there is no value"
+            _leave_out(chosen, picked, quantity, where, values)
+            del table[quantity]
+
+
+def _leave_out(
+    chosen: Chosen, picked: dict[str, Pick], quantity: str, where: str, values: Values
+) -> None:
+    pick = picked.pop(quantity)
+    chosen.picked.pop(quantity, None)
+    values.notes.append(
+        f"the {quantity.replace('_', ' ')} was not imported: {pick.column!r} has gaps ({where}); "
+        f"it is with --column {shlex.quote(f'{pick.target.name}={pick.column}')} and "
+        f"--skip-bad-rows"
+    )
+
+
+def _step(chosen: Chosen, columns: Sequence[str], rate_Hz: float | None) -> float | None:
+    """Return the time from row to row where no column has the time. Raises ``InputError``."""
+    if rate_Hz is not None:
+        if not 0.0 < rate_Hz < float("inf"):
+            raise InputError(f"the rate is {rate_Hz!r} Hz; it must be a finite number above 0")
+        if "time" in chosen.picked:
+            raise InputError("both a rate and a column for time are given; give one of them")
+        return 1.0 / rate_Hz
+    if "time" in chosen.picked:
+        return None
+    given = getattr(chosen.source, "step_s", None)
+    step = given(columns) if given is not None else None
+    if step is None:
+        raise NeedsOptionError(
+            f"{chosen.source.path} has no column for time ({names_of('time')}); there are: "
+            f"{listing(chosen.source.names)}{suggestion(['time_s'], chosen.source.names)}; give "
+            f"--rate-Hz if the samples are evenly spaced",
+            "--rate-Hz",
+            "RATE",
+        )
+    return float(step)
+
+
+def _good_rows(
+    chosen: Chosen, table: dict[str, np.ndarray], names: dict[str, str], skip: bool
+) -> np.ndarray:
+    """Return which rows are finite and go forward in time, (n,) bool.
+
+    Raises ``InputError`` for the first other one unless ``skip``.
+    """
+    source = chosen.source
+    good = np.ones(table["time"].size, dtype=bool)
+    finite = {}
+    if not getattr(source, "is_finite", False):
+        finite = {quantity: np.isfinite(column) for quantity, column in table.items()}
+    for column in finite.values():
+        good &= column
+    if not skip and not good.all():
+        at = int(np.argmin(good))
+        quantity = next(q for q in table if not finite[q][at])
+        cell = getattr(source, "cell", None)
+        wrong = "" if cell is None else cell(at, names[quantity])
+        raise NeedsOptionError(
+            f"{source.path}, {source.row(at)}, column {names[quantity]!r}: "
+            f"{wrong or f'{table[quantity][at]} is not a finite number'}; --skip-bad-rows leaves "
+            f"such rows out",
+            "--skip-bad-rows",
+        )
+    seconds = table["time"]
+    if not skip:
+        if (back := not_forward(seconds)) is not None:
+            at, how = back
+            raise NeedsOptionError(
+                f"{source.path}, {source.row(at)}, column {names['time']!r}: time {how}, from "
+                f"{seconds[at - 1]:.9g} to {seconds[at]:.9g}; --skip-bad-rows leaves such rows "
+                f"out, and --rate-Hz replaces the time of evenly spaced samples",
+                "--skip-bad-rows",
+            )
+        return good
+    latest = np.maximum.accumulate(np.where(good, seconds, -np.inf))
+    good[1:] &= seconds[1:] > latest[:-1]
+    return good
+
+
+def _note_left_out(chosen: Chosen, values: Values, good: np.ndarray) -> None:
+    """Note which rows were left out, at the sample before which they stood."""
+    skipped: Sequence[tuple[int, str]] = getattr(chosen.source, "skipped", ())
+    if not skipped and good.all():
+        return
+    kept = np.cumsum(good)
+    places = [(int(kept[min(at, good.size) - 1]) if at else 0, where) for at, where in skipped]
+    bad = np.flatnonzero(~good)[:_LISTED].tolist()
+    rows = getattr(chosen.source, "rows", None)
+    found = rows(bad) if rows is not None and bad else [chosen.source.row(at) for at in bad]
+    places += [(int(kept[at]), where) for at, where in zip(bad, found, strict=True)]
+    for sample, where in places:
+        values.left.setdefault(sample, []).append(where)
+    count = len(skipped) + int((~good).sum())
+    if count:
+        values.warnings.append(f"{count} rows were left out because they could not be used")
+
+
+_LISTED = 100  # rows whose places are looked up

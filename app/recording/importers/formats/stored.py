@@ -1,0 +1,242 @@
+"""Columns of a file that are called by their paths: the source of most binary formats."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from dearig.errors import InputError
+from dearig.recording.files import one_line
+from dearig.recording.importers.formats.columns import NamedColumns
+from dearig.recording.importers.source import PARSER_FAILURES, listing, no_such_column
+
+__all__ = ["Stored", "StoredColumns", "as_numbers", "rate_step"]
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A column (n,) of a file.
+
+    Attributes
+    ----------
+    load : callable
+        Returns its values: numbers, or dates and times of day.
+    size : int, optional
+        Number of values, where it is known before they are read.
+    own : str
+        Its name without its path; of a column of a matrix, with its number: ``x[2]``.
+    unit, label : str
+        What the file says of it beside its name.
+    table : str
+        The group, sheet or struct that it belongs to; columns of "" belong to all.
+    step_s, start_s : float, optional
+        Time from row to row, and of the first row.
+    cell : callable, optional
+        Returns what is wrong with the value at an index that is no number, in words.
+    row : callable, optional
+        Returns the place in the file of the value at an index, in words.
+    """
+
+    load: Callable[[], np.ndarray]
+    size: int | None
+    own: str
+    unit: str = ""
+    label: str = ""
+    table: str = ""
+    step_s: float | None = None
+    start_s: float = 0.0
+    cell: Callable[[int], str] | None = None
+    row: Callable[[int], str] | None = None
+
+
+class StoredColumns(NamedColumns[Stored]):
+    """The ``columns`` of the file at ``path``, by their paths; see ``Source``.
+
+    ``what`` the file should be ("an HDF5 file") is for messages. ``separator`` stands between the
+    parts of a path. Columns of one value beside longer ones are settings of the measurement: the
+    one that is called ``fs`` or ``dt`` gives the time from row to row. Raises ``InputError`` if
+    there are no columns.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        what: str,
+        columns: Mapping[str, Stored],
+        *,
+        separator: str = "/",
+        about: Mapping[str, str] = MappingProxyType({}),
+        notes: Sequence[str] = (),
+        cut_short: bool = False,
+        default_table: str | None = None,
+    ) -> None:
+        self.path, self.about, self.notes = path, about, notes
+        self.cut_short, self.default_table = cut_short, default_table
+        self._what, self._separator = what, separator
+        single = {name for name, column in columns.items() if column.size == 1}
+        if len(single) == len(columns):
+            single = set()
+        super().__init__({n: c for n, c in columns.items() if n not in single})
+        self._settings = {n: columns[n] for n in single}
+        self.step_from = ""
+        self._row: Callable[[int], str] | None = None
+        if not self._columns:
+            raise InputError(f"{path} holds no columns of numbers")
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Longer names by column, where the file gives them."""
+        return {name: column.label for name, column in self._columns.items() if column.label}
+
+    @property
+    def tables(self) -> dict[str, list[str]]:
+        """Columns by their tables; each has those of no table too."""
+        found: dict[str, list[str]] = {}
+        for name, column in self._columns.items():
+            if column.table:
+                found.setdefault(column.table, []).append(name)
+        shared = [name for name, column in self._columns.items() if not column.table]
+        return {table: [*shared, *names] for table, names in found.items()}
+
+    def own_name(self, name: str) -> str:
+        """Return ``name`` without its path, and without its number in a matrix."""
+        return re.sub(r"\[\d+\]$", "", self._columns[name].own)
+
+    def named(self, name: str) -> list[str]:
+        """Return the columns whose path is ``name`` or ends with it."""
+        end = self._separator + name
+        return [
+            n for n, column in self._columns.items() if name in (n, column.own) or n.endswith(end)
+        ]
+
+    def size(self, name: str) -> int | None:
+        """Return the number of values of a column; None if it is not known yet."""
+        return self._columns[name].size
+
+    def step_s(self, names: Sequence[str]) -> float | None:
+        """Return the time from row to row of the columns ``names``; None if nothing gives it.
+
+        Raises ``InputError`` for columns of several rates or starts.
+        """
+        timed = {n: c for n in names if (c := self._columns[n]).step_s is not None}
+        for column in timed.values():
+            first = next(iter(timed.values()))
+            if not _same_timing(first, column):
+                different = ", ".join(
+                    f"{n} every {c.step_s:.6g} s from {c.start_s:.6g} s" for n, c in timed.items()
+                )
+                raise InputError(
+                    f"{self.path}: the columns have different times: {different}; they are not "
+                    f"resampled here: give columns of one rate with --column"
+                )
+        if timed:
+            return next(iter(timed.values())).step_s
+        for name, setting in self._settings.items():
+            value = self.read_setting(name)
+            step = None if value is None else rate_step(setting.own, value)
+            if step is not None:
+                self.step_from = repr(name)
+                return step
+        return None
+
+    def read_setting(self, name: str) -> float | None:
+        """Return the number of the column of one value ``name``; None if it cannot be read."""
+        try:
+            return float(as_numbers(self._settings[name].load())[0])
+        except (*PARSER_FAILURES, InputError):
+            return None
+
+    def row(self, index: int) -> str:
+        """Return the row of sample ``index``, counted from 1."""
+        return f"row {index + 1}" if self._row is None else self._row(index)
+
+    def cell(self, index: int, name: str) -> str:
+        """Return what is wrong with a value, in words; empty if only its value is known."""
+        cell = self._columns[name].cell if name in self._columns else None
+        return "" if cell is None else cell(index)
+
+    def check(self, name: str) -> None:
+        """See ``Source``."""
+        if name in self._columns:
+            return
+        inside = [n for n in self._columns if re.match(re.escape(name) + r"[./\[({]", n)]
+        if inside:
+            raise InputError(
+                f"{self.path}: {name!r} holds several columns; give one of them: {listing(inside)}"
+            )
+        raise no_such_column(self, name)
+
+    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return columns by name; see ``Source``."""
+        found = {}
+        for number, name in enumerate(names, 1):
+            column = self._columns[name]
+            try:
+                found[name] = as_numbers(column.load())
+            except PARSER_FAILURES as error:
+                raise InputError(
+                    f"{self.path} cannot be read as {self._what}: {name}: {one_line(error)}"
+                ) from error
+            self._row = column.row
+            self.progress(number / len(names))
+        return found
+
+
+#: Part of a step by which the starts of columns that were sampled together may differ.
+START_APART = 0.01
+
+
+def _same_timing(one: Stored, other: Stored) -> bool:
+    step, second = one.step_s or 0.0, other.step_s or 0.0
+    return bool(
+        np.isclose(step, second, rtol=1e-9, atol=0.0)
+        and abs(one.start_s - other.start_s) <= START_APART * step
+    )
+
+
+def as_numbers(values: np.ndarray) -> np.ndarray:
+    """Return ``values`` (n,) as float64; of dates and durations, in s, dates from the first.
+
+    What is not a time becomes not a number.
+    """
+    if values.dtype.kind == "M":
+        there = values[~np.isnat(values)]
+        values = values - there[0] if there.size else values - values
+    if values.dtype.kind == "m":
+        seconds = values / np.timedelta64(1, "s")
+        return np.asarray(seconds, dtype=np.float64)
+    return np.asarray(values, dtype=np.float64)
+
+
+#: Names of one number that is a sample rate, and of one that is the time from row to row. A mere
+#: "frequency" or "rate" may be that of the excitation or of the strain.
+_RATES = re.compile(
+    r"(f_?s|f_?sample|(sample|sampling|samp|acquisition|scan|daq)_?(rate|frequency|freq)"
+    r"|abtastrate|abtastfrequenz)(_?(?P<unit>hz|khz|sps))?|rate_hz"
+)
+_STEPS = re.compile(
+    r"(dt|ts|d_t|delta_?(t|x|time)|x?_?increment|wf_increment|time_?step"
+    r"|(sample|sampling)_?(time|interval|period)|abtastzeit)(_?(?P<unit>s|ms|us))?"
+)
+#: Shortest and longest time in s from row to row that a setting may give.
+STEP_MIN, STEP_MAX = 1e-12, 1e6
+_PER_UNIT = MappingProxyType({"khz": 1e3, "ms": 1e-3, "us": 1e-6})
+
+
+def rate_step(name: str, value: float) -> float | None:
+    """Return the time in s from row to row that a setting called ``name`` gives, or None."""
+    plain = re.sub(r"[\s\-.()\[\]]+", "_", name.strip().lower()).strip("_")
+    if not 0.0 < value < float("inf"):
+        return None
+    if match := _RATES.fullmatch(plain):
+        step = 1.0 / (value * _PER_UNIT.get(match["unit"] or "", 1.0))
+    elif match := _STEPS.fullmatch(plain):
+        step = value * _PER_UNIT.get(match["unit"] or "", 1.0)
+    else:
+        return None
+    return step if STEP_MIN <= step <= STEP_MAX else None

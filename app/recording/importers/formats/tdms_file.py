@@ -1,0 +1,147 @@
+"""Columns of a TDMS file (LabVIEW): channels, called ``group/channel``."""
+
+from __future__ import annotations
+
+import logging
+import struct
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+
+from dearig.errors import InputError
+from dearig.input_file import open_input
+from dearig.recording.files import one_line
+from dearig.recording.importers.formats.stored import Stored, StoredColumns
+from dearig.recording.importers.importer import Importer
+from dearig.recording.importers.source import PARSER_FAILURES, printable
+
+if TYPE_CHECKING:
+    from nptdms import TdmsChannel, TdmsFile
+
+__all__ = ["IMPORTER", "TdmsChannels"]
+
+#: Start of every segment: tag and contents, then version, size of the segment, size of its
+#: metadata, in the byte order that the contents say.
+LEAD_IN, SIZES = struct.Struct("<4sI"), {"<": struct.Struct("<IQQ"), ">": struct.Struct(">IQQ")}
+LEAD_IN_BYTES = 28
+BIG_ENDIAN = 1 << 6
+#: Size that marks a segment whose writing was not completed.
+NOT_ENDED = 2**64 - 1
+#: Channels that are listed; measurements have fewer.
+CHANNELS_MAX = 2000
+
+
+class TdmsChannels(StoredColumns):
+    """The TDMS file at ``path``. Raises ``InputError`` if it cannot be read or holds no numbers.
+
+    Values are scaled as the file says. The waveform timing of the channels is the time where no
+    channel has it. Of a file that was not closed, or cut short, what is whole is read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        columns: dict[str, Stored] = {}
+        with _opened(path) as file:
+            size = path.stat().st_size
+            claimed = sum(len(channel) for group in file.groups() for channel in group.channels())
+            if claimed > size:
+                raise InputError(
+                    f"{path} is damaged: its channels claim {claimed} values, and it has {size} "
+                    f"bytes"
+                )
+            channels = [channel for group in file.groups() for channel in group.channels()]
+            starts = [s for c in channels if (s := _started(c)) is not None]
+            for channel in islice(channels, CHANNELS_MAX):
+                if channel.dtype.kind not in "fiuM" or len(channel) == 0:
+                    continue
+                name = printable(f"{channel.group_name}/{channel.name}")
+                columns[name] = self._stored(channel, min(starts, default=None))
+        if not columns:
+            raise InputError(f"{path} holds no channels of numbers")
+        super().__init__(path, "a TDMS file", columns, cut_short=_is_cut_short(path))
+
+    def _stored(self, channel: TdmsChannel, first: np.datetime64 | None) -> Stored:
+        told: Mapping[str, object] = channel.properties
+        step = _number(told.get("wf_increment"))
+        start, started = _number(told.get("wf_start_offset")), _started(channel)
+        if started is not None and first is not None:
+            start += float((started - first) / np.timedelta64(1, "us")) / 1e6
+        dates = channel.dtype.kind == "M"
+        return Stored(
+            _loader(self.path, channel.group_name, channel.name), len(channel), channel.name,
+            "s" if dates else str(told.get("unit_string", "")),
+            "time" if dates else str(told.get("description", "")),
+            printable(channel.group_name), step if step > 0.0 else None, start,
+        )  # fmt: skip
+
+
+def _loader(path: Path, group: str, channel: str) -> Callable[[], np.ndarray]:
+    def load() -> np.ndarray:
+        with _opened(path) as file:
+            return np.asarray(file[group][channel][:])
+
+    return load
+
+
+def _started(channel: TdmsChannel) -> np.datetime64 | None:
+    """Return the date and time of the first sample of a waveform, or None."""
+    start = channel.properties.get("wf_start_time")
+    return start if isinstance(start, np.datetime64) and not np.isnat(start) else None
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, (int, float)) else 0.0
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[TdmsFile]:
+    """Give the file; raises ``InputError`` for what the library raises on damaged ones."""
+    from nptdms import TdmsFile
+    from nptdms.log import log_manager
+
+    # its messages go into the error, not to the terminal
+    log_manager.set_level(logging.ERROR)
+    with open_input(path) as stream:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                with TdmsFile.open(stream) as file:
+                    yield file
+        except PARSER_FAILURES as error:
+            raise InputError(f"{path} cannot be read as a TDMS file: {one_line(error)}") from error
+
+
+def _is_cut_short(path: Path) -> bool:
+    """Return True unless every segment of the file is complete."""
+    with open_input(path) as stream:
+        return any(at + size > path.stat().st_size for at, size in _segments(stream, path))
+
+
+def _segments(stream: BinaryIO, path: Path) -> Iterator[tuple[int, int]]:
+    """Yield the place and the size of every segment."""
+    at, end = 0, path.stat().st_size
+    while at < end:
+        stream.seek(at)
+        lead_in = stream.read(LEAD_IN_BYTES)
+        if len(lead_in) < LEAD_IN_BYTES or lead_in[:4] != b"TDSm":
+            yield at, LEAD_IN_BYTES + end
+            return
+        contents = LEAD_IN.unpack_from(lead_in)[1]
+        order = ">" if contents & BIG_ENDIAN else "<"
+        size = SIZES[order].unpack_from(lead_in, LEAD_IN.size)[1]
+        yield at, LEAD_IN_BYTES + size
+        if size == NOT_ENDED:
+            return
+        at += LEAD_IN_BYTES + size
+
+
+def _sniff(head: bytes) -> bool:
+    return head.startswith(b"TDSm")
+
+
+IMPORTER = Importer("TDMS", (".tdms",), TdmsChannels, _sniff)

@@ -1,0 +1,443 @@
+"""Columns of a table of numbers in a text file: CSV and its many relatives.
+
+pandas parses the numbers, a block of lines at a time. A block that it refuses is halved until few
+lines are left, which are read one by one, to say which cell is wrong, or to leave that row out.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import math
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from dearig.errors import InputError
+from dearig.input_file import open_input
+from dearig.recording.files import in_words
+from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
+from dearig.recording.importers.formats.columns import NamedColumns, Overview
+from dearig.recording.importers.formats.text_blocks import BytesReader, blocks_of, halves_of
+from dearig.recording.importers.formats.text_layout import (
+    HEAD_CHARACTERS,
+    Column,
+    Layout,
+    cells_of,
+    encoding_of,
+    holds_data,
+    layout_of,
+)
+from dearig.recording.importers.formats.text_sections import Section, sections_of
+from dearig.recording.importers.importer import Importer
+from dearig.recording.importers.source import GapError, NeedsOptionError, no_such_column
+
+__all__ = ["IMPORTER", "TextFile"]
+
+#: Bytes of a block that is read line by line where it is not whole.
+SHORT = 2**15
+#: Threads that parse blocks.
+THREADS = 2
+#: Room for rows, in multiples of those that the first block lets expect.
+ROOM = 1.05
+#: Bytes of an ASCII character in encodings where it has several.
+_WIDTHS = MappingProxyType({"utf-16": 2, "utf-32": 4})
+_HEAD = 4 * HEAD_CHARACTERS  # bytes: a character has four at most
+
+
+class TextFile(NamedColumns[Column]):
+    """The text file at ``path``. Raises ``InputError`` if it holds no table of numbers.
+
+    ``names_line`` is the number of the line of names, from 1, where it is not found by itself. With
+    ``skip_bad_rows`` rows that cannot be read are left out; ``skipped`` has their lines afterwards.
+    """
+
+    is_finite = True  # other cells are refused, or their rows left out
+
+    def __init__(
+        self, path: Path, names_line: int | None = None, skip_bad_rows: bool = False
+    ) -> None:
+        self.path = path
+        self.about: dict[str, str] = {}
+        try:
+            with open_input(path) as file:
+                raw = file.read(_HEAD)
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+        encoding = encoding_of(raw, path)
+        try:
+            head = codecs.getincrementaldecoder(encoding)().decode(raw, len(raw) < _HEAD)
+        except UnicodeDecodeError as error:
+            raise InputError(f"{path} begins as {encoding} text but is not: {error}") from error
+        head = head[:HEAD_CHARACTERS]
+        if len(head) == HEAD_CHARACTERS:
+            head = head.rpartition("\n")[0] or head
+        self.layout: Layout = layout_of(head, encoding, path, names_line)
+        columns = {column.name: column for column in self.layout.columns}
+        self._section_of: dict[str, Section] = {}
+        lines = head.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        sections = sections_of(path, self.layout, lines[self.layout.names_line])
+        if sections:
+            columns = {}
+            for section in sections:
+                for column in self.layout.columns:
+                    name = f"{section.title}/{column.name}"
+                    group = f"{section.title}/{column.group}" if column.group else section.title
+                    columns[name] = replace(column, name=name, group=group)
+                    self._section_of[name] = section
+        super().__init__(columns)
+        #: columns that are given up, with ``GapError``, where a cell is no number
+        self.optional: frozenset[str] = frozenset()
+        self._skip = skip_bad_rows
+        # it costs a third of the parsing
+        self._is_spaced = f"{self.layout.delimiter} " in head
+        self._side_by_side = any(column.group for column in self.layout.columns)
+        self._wanted: list[Column] = []  # columns that were read last
+        self._section = Section("", self.layout.first, None)  # and the table that they are of
+        #: rows before each row that was left out, and its line, in words
+        self.skipped: list[tuple[int, str]] = []
+        self._spans: list[_Span] = []
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """What columns are that do not say it by their names: dates and times of day are times."""
+        return {name: "time" for name, column in self._columns.items() if column.since is not None}
+
+    @property
+    def places(self) -> dict[int, str]:
+        """Names by the number of the column in the file, from 1, or by their order in tables."""
+        if self._section_of:
+            return dict(enumerate(self._columns, 1))
+        return {column.place + 1: name for name, column in self._columns.items()}
+
+    @property
+    def tables(self) -> dict[str, list[str]]:
+        """Columns of each specimen or table, where several stand side by side."""
+        found: dict[str, list[str]] = {}
+        for name, column in self._columns.items():
+            if column.group:
+                found.setdefault(column.group, []).append(name)
+        return found
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences on what could be read in another way."""
+        return self.layout.notes
+
+    @property
+    def block(self) -> Sequence[Sequence[str]]:
+        """Cells of the lines above the names."""
+        return self.layout.block
+
+    def step_s(self, names: Sequence[str]) -> float | None:  # noqa: ARG002
+        """Return the time from row to row that the file's head gives; None if it gives none."""
+        return self.layout.step_s
+
+    def named(self, name: str) -> list[str]:
+        """Return the columns called ``name``."""
+        return [n for n, column in self._columns.items() if name in (n, column.own)]
+
+    def check(self, name: str) -> None:
+        """See ``Source``."""
+        if name not in self._columns:
+            raise no_such_column(self, name)
+
+    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return columns by name; see ``Source``."""
+        found: dict[str, np.ndarray] = {}
+        for section in dict.fromkeys(self._section_of.get(name) for name in names):
+            self._section = section or self._section
+            found |= self._read_section([n for n in names if self._section_of.get(n) == section])
+        return found
+
+    def _read_section(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        wanted = [self._ordered(name) for name in dict.fromkeys(names)]
+        self.skipped, self._spans, self._wanted = [], [], wanted
+        table = _Table(len(wanted))
+        size = left = self._size
+        for line, block, values in self._parsed():
+            self._keep(line, block, values, table, left)
+            left -= len(block)
+            self.progress(1.0 - max(left, 0) / size)
+        return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
+
+    def _ordered(self, name: str) -> Column:
+        """Return the column ``name``, with the order of day and month that the whole file says."""
+        column = self._columns[name]
+        if column.is_open:
+            column = replace(with_order(column, self._cells(column.place)), is_open=False)
+            self._columns[name] = column
+        return column
+
+    def _cells(self, place: int) -> Iterator[str]:
+        """Yield the cells at ``place`` of all lines of the table."""
+        for _, block in self._blocks():
+            for line in block.decode("utf-8", "replace").split("\n"):
+                try:
+                    cells = cells_of(line, self.layout.delimiter)
+                except csv.Error:
+                    continue
+                if place < len(cells):
+                    yield cells[place]
+
+    def overview(self, names: Sequence[str], count: int) -> dict[str, Overview]:
+        """Return the first ``count`` values of columns, how many there are, and their range.
+
+        All are read at once. Cells that are no numbers are passed over, in each column by itself.
+        """
+        found: dict[str, Overview] = {}
+        for section in dict.fromkeys(self._section_of.get(name) for name in names):
+            self._section = section or self._section
+            self._wanted = [self._columns[n] for n in names if self._section_of.get(n) == section]
+            seen = [Overview() for _ in self._wanted]
+            size, done = self._size, 0
+            for _, block, values in self._parsed():
+                columns = self._apart(block) if values is None else values
+                seen = [o.with_values(v, count) for o, v in zip(seen, columns, strict=True)]
+                done += len(block)
+                self.progress(min(done / size, 1.0))
+            found |= {column.name: o for column, o in zip(self._wanted, seen, strict=True)}
+        return found
+
+    @property
+    def _size(self) -> int:
+        """Size of the file in bytes, if it were in UTF-8 as the blocks are; 1 at least."""
+        return max(self.path.stat().st_size // _WIDTHS.get(self.layout.encoding[:6], 1), 1)
+
+    def row(self, index: int) -> str:
+        """Return the line of sample ``index`` of what was read last."""
+        return self.rows([index])[0]
+
+    def rows(self, indices: Sequence[int]) -> list[str]:
+        """Return the lines of the samples ``indices``, which go up, of what was read last."""
+        skipped = {where for _, where in self.skipped}
+        spans = iter(self._spans)
+        span = next(spans)
+        found: list[str] = []
+        for first, block in self._blocks():
+            lines = block.removesuffix(b"\n").split(b"\n")
+            while span.line < first + len(lines):
+                left = [i - span.before for i in indices[len(found) :] if i < span.end]
+                count = -1
+                for number in range(span.line, first + len(lines)) if left else ():
+                    if f"line {number}" in skipped or not self._is_row(lines[number - first]):
+                        continue
+                    count += 1
+                    if count == left[0]:
+                        found.append(f"line {number}")
+                        if not left[1:]:
+                            break
+                        del left[0]
+                if len(found) == len(indices):
+                    return found
+                span = next(spans)
+        raise IndexError(indices[len(found)])
+
+    def _is_row(self, line: bytes) -> bool:
+        return self._holds_data(line.decode("utf-8", "replace"))
+
+    def _blocks(self) -> Iterator[tuple[int, bytes]]:
+        section = self._section
+        return blocks_of(self.path, self.layout.encoding, section.first, section.end)
+
+    def _parsed(self) -> Iterator[tuple[int, bytes, list[np.ndarray] | None]]:
+        """Yield the blocks of the file, each with what ``_read_fast`` makes of it, in order.
+
+        pandas parses outside of Python's lock, so two threads take half the time.
+        """
+        import pandas as pd  # noqa: F401  (once, before threads do)
+
+        waiting: deque[tuple[int, bytes, Future[list[np.ndarray] | None]]] = deque()
+        with ThreadPoolExecutor(THREADS) as threads:
+            for line, block in self._blocks():
+                waiting.append((line, block, threads.submit(self._read_fast, block)))
+                if len(waiting) > THREADS:
+                    first, whole, found = waiting.popleft()
+                    yield first, whole, found.result()
+            for first, whole, found in waiting:
+                yield first, whole, found.result()
+
+    def _keep(
+        self, line: int, block: bytes, values: list[np.ndarray] | None, table: _Table, left: int
+    ) -> None:
+        """Append the rows of ``block`` to ``table``; of ``left`` bytes of the file, it is a part.
+
+        A block that is not whole is halved until the lines that are wrong stand alone.
+        """
+        if values is None:
+            halves = halves_of(line, block) if self._is_plain and len(block) > SHORT else []
+            if len(halves) > 1:
+                for first, half in halves:
+                    self._keep(first, half, self._read_fast(half), table, left)
+                return
+            values = self._read_slowly(table.rows, line, block)
+        before = table.rows
+        table.append(values, left / len(block))
+        self._spans.append(_Span(before, line, table.rows))
+
+    @property
+    def _is_plain(self) -> bool:
+        """True if pandas can parse the columns that are read."""
+        plain = self._wanted[0].decimal if self._wanted else ""
+        return all(c.since is None and not c.thousands and c.decimal == plain for c in self._wanted)
+
+    def _read_fast(self, block: bytes) -> list[np.ndarray] | None:
+        """Return the columns (rows,) as pandas parses them; None if they are not whole."""
+        import pandas as pd  # takes a second to import, and most commands read no table
+
+        layout, wanted = self.layout, self._wanted
+        if not self._is_plain or not wanted:
+            return None
+        try:
+            table = pd.read_csv(
+                BytesReader(block), header=None, names=range(layout.cells), index_col=False,
+                sep=r"\s+" if layout.delimiter is None else layout.delimiter, comment="#",
+                decimal=wanted[0].decimal,
+                dtype=dict.fromkeys((c.place for c in wanted), np.float64),
+                skipinitialspace=self._is_spaced, na_filter=False, engine="c", low_memory=False,
+            )  # fmt: skip
+        except (ValueError, OverflowError):  # a parser's error is a ValueError
+            return None
+        values = [table[column.place].to_numpy() for column in wanted]
+        # a row that is too short has no last cell
+        last = table[layout.cells - 1]
+        whole = last.dtype.kind == "f" or bool((last.astype(str) != "").all())
+        return values if whole and all(np.isfinite(v).all() for v in values) else None
+
+    def _apart(self, block: bytes) -> list[np.ndarray]:
+        """Return the numbers of each column of ``block``, without cells that are none."""
+        import pandas as pd
+
+        layout = self.layout
+        try:
+            table = pd.read_csv(
+                BytesReader(block), header=None, names=range(layout.cells), index_col=False,
+                sep=r"\s+" if layout.delimiter is None else layout.delimiter, comment="#",
+                usecols=sorted({c.place for c in self._wanted}), dtype=str, na_filter=False,
+                skipinitialspace=self._is_spaced, on_bad_lines="skip", engine="c",
+                low_memory=False,
+            )  # fmt: skip
+        except (ValueError, OverflowError):  # nothing is left of it
+            return [np.empty(0) for _ in self._wanted]
+        found = []
+        for column in self._wanted:
+            cells = table[column.place].astype(str)
+            if self._is_plain and column.decimal == ".":
+                numbers = pd.to_numeric(cells, errors="coerce").to_numpy(np.float64)
+            else:
+                read = (number_in(cell.strip(), column) for cell in cells)
+                numbers = np.array([math.nan if n is None else n for n in read], dtype=np.float64)
+            found.append(numbers[np.isfinite(numbers)])
+        return found
+
+    def _read_slowly(self, before: int, line: int, block: bytes) -> list[np.ndarray]:
+        """Return the columns (rows,), read line by line; ``before`` are the rows above.
+
+        Raises ``InputError`` for a wrong cell, or leaves its row out.
+        """
+        rows: list[list[float]] = []
+        for number, content in enumerate(block.decode("utf-8", "replace").split("\n"), line):
+            if not self._holds_data(content):
+                continue
+            fault, values, column = self._row(content, self._wanted)
+            if not fault:
+                rows.append(values)
+            elif column in self.optional:
+                raise GapError(f"line {number}{fault}", column)
+            elif self._skip:
+                self.skipped.append((before + len(rows), f"line {number}"))
+            else:
+                raise NeedsOptionError(
+                    f"{self.path}, line {number}{fault}; --skip-bad-rows leaves such rows out",
+                    "--skip-bad-rows",
+                )
+        return list(np.array(rows, dtype=np.float64).reshape(len(rows), len(self._wanted)).T)
+
+    def _holds_data(self, content: str) -> bool:
+        """Return True if a line has a row of the columns that are read.
+
+        Of specimens side by side, one may be shorter than another.
+        """
+        if not holds_data(content) or not self._side_by_side:
+            return holds_data(content)
+        cells = cells_of(content, self.layout.delimiter)
+        return any(c.place < len(cells) and cells[c.place] for c in self._wanted)
+
+    def _row(self, content: str, wanted: Sequence[Column]) -> tuple[str, list[float], str]:
+        """Return what is wrong with a line, empty if nothing is, its values, and in which column.
+
+        The column is "" where the whole line is wrong.
+        """
+        try:
+            cells = cells_of(content, self.layout.delimiter)
+        except csv.Error as error:
+            return f": it cannot be split: {error}", [], ""
+        if len(cells) != self.layout.cells:
+            said = f": {len(cells)} values, and the table has {self.layout.cells} columns"
+            return said, [], ""
+        values = []
+        for column in wanted:
+            value = number_in(cells[column.place], column)
+            if value is None or not math.isfinite(value):
+                wrong = complaint_about(cells[column.place], value)
+                return f", column {column.name!r}: {wrong}", [], column.name
+            values.append(value)
+        return "", values, ""
+
+
+@dataclass(frozen=True)
+class _Span:
+    """Rows of the table from ``before`` to ``end``, which begin in ``line`` of the file."""
+
+    before: int
+    line: int
+    end: int
+
+
+class _Table:
+    """Columns that grow by blocks of rows; ``rows`` of them are there."""
+
+    def __init__(self, width: int) -> None:
+        self._room = np.empty((width, 0))
+        self.rows = 0
+
+    @property
+    def values(self) -> np.ndarray:
+        """The rows that are there, (columns, rows)."""
+        return self._room[:, : self.rows]
+
+    def append(self, columns: Sequence[np.ndarray], more: float) -> None:
+        """Append rows; ``more`` times as many are expected, with these."""
+        count = columns[0].size if columns else 0
+        end = self.rows + count
+        if end > self._room.shape[1]:
+            # room that is never written takes no memory
+            grown = np.empty((len(columns), self.rows + int(count * max(more, 1.0) * ROOM) + 1))
+            grown[:, : self.rows] = self.values
+            self._room = grown
+        for room, values in zip(self._room, columns, strict=True):
+            room[self.rows : end] = values
+        self.rows = end
+
+
+def _sniff(head: bytes) -> bool:
+    """Return True for the beginning of a text with a table of numbers."""
+    path = Path("file")
+    try:
+        encoding = encoding_of(head, path)
+        text = head.decode(encoding, "replace")
+        return bool(layout_of(text.rpartition("\n")[0] or text, encoding, path).columns)
+    except InputError:
+        return False
+
+
+_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".tra", ".lvm")
+
+IMPORTER = Importer(
+    "text table", _SUFFIXES, TextFile, _sniff, True, ("names_line", "skip_bad_rows")
+)

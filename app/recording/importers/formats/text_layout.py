@@ -1,0 +1,481 @@
+"""Layout of a table of numbers in a text file, found from its first lines.
+
+The lines of data decide: several in a row with as many numbers each. What stands above them are
+names, units, or a block of parameters of the machine.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import functools
+import itertools
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from dearig.errors import InputError
+from dearig.recording.importers.quantities.labels import has_east_asian_name
+from dearig.recording.importers.quantities.moments import day_first_or_open, is_open_date, moment_of
+from dearig.recording.importers.quantities.text_numbers import Signs, is_number, signs_of
+from dearig.recording.importers.quantities.units import unit_of
+
+__all__ = [
+    "HEAD_CHARACTERS",
+    "Column",
+    "Layout",
+    "cells_of",
+    "encoding_of",
+    "holds_data",
+    "is_row",
+    "layout_of",
+]
+
+#: Characters from the start in which the layout is looked for: blocks of parameters are short.
+HEAD_CHARACTERS = 2**16
+#: Columns, at most. Data loggers write some hundred; each name is compared with those known.
+COLUMNS_MAX = 2000
+
+_COMMENTS = ("#", "%", "//", ";#")
+_MARKS = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF32_LE: "utf-32",  # before UTF-16, whose mark it begins with
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+_EAST_ASIAN = ("gb18030", "cp932")  # taken where they give a name that is known
+_DELIMITERS = ("\t", ";", ",", "|", None)  # None: any white space
+_RULE = re.compile(r"[\s|+:=_*-]+")  # a line that is drawn below the names
+_SAMPLE = 400  # lines of data that are looked at
+_LEAST = 2  # lines of data in a row that begin a table
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a text table: its name, the unit below the name, and its place from 0.
+
+    ``own`` is its name without ``group``, the specimen or table that it belongs to where there are
+    several side by side, and without the place behind a repeated name. ``decimal`` is the sign
+    before decimals, ``thousands`` that between groups of digits, or empty. ``since`` is the first
+    moment of a column of dates and times of day, which is read in s from it. ``day_first`` is the
+    order in its dates, which ``is_open`` where their form does not say it: then all of them do.
+    """
+
+    name: str
+    place: int
+    unit: str = ""
+    decimal: str = "."
+    thousands: str = ""
+    since: datetime | None = None
+    group: str = ""
+    own: str = ""
+    day_first: bool = True
+    is_open: bool = False
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Layout of a text table.
+
+    ``first`` is the number, from 0, of the first line of data; ``names_line`` that of the names,
+    -1 if there is none. ``cells`` are the cells of a line of data, ``block`` those of the lines
+    above the names, ``step_s`` the time from row to row where the file says it. ``notes`` are
+    sentences on what could be read in another way.
+    """
+
+    encoding: str
+    delimiter: str | None
+    first: int
+    names_line: int
+    cells: int
+    columns: tuple[Column, ...]
+    block: tuple[tuple[str, ...], ...] = ()
+    step_s: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+def encoding_of(raw: bytes, path: Path) -> str:
+    """Return the encoding of a text that begins with ``raw``; ``InputError`` if it is none."""
+    for mark, encoding in _MARKS.items():
+        if raw.startswith(mark):
+            return encoding
+    raw = raw.rstrip(b"\0") or raw  # a logger that was cut off leaves zeros at the end
+    if b"\0" in raw:
+        # text of ASCII characters as UTF-16 has a zero in every other byte
+        even, odd = raw[::2].count(0), raw[1::2].count(0)
+        half = len(raw) / 2
+        if odd > 0.8 * half and even < 0.1 * half:
+            return "utf-16-le"
+        if even > 0.8 * half and odd < 0.1 * half:
+            return "utf-16-be"
+        raise InputError(
+            f"{path} is not a text file, and of no other kind that can be imported; export it as "
+            f"text from the program that made it"
+        )
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(raw)
+    except UnicodeDecodeError:
+        # numbers are ASCII in any case; only a name may be decoded wrongly
+        for encoding in _EAST_ASIAN:
+            text = codecs.getincrementaldecoder(encoding)("replace").decode(raw)
+            if "\N{REPLACEMENT CHARACTER}" not in text and has_east_asian_name(text):
+                return encoding
+        return "cp1252" if not set(raw) & {0x81, 0x8D, 0x8F, 0x90, 0x9D} else "latin-1"
+    return "utf-8"
+
+
+def cells_of(line: str, delimiter: str | None) -> list[str]:
+    """Return the cells of ``line`` without quotes and surrounding blanks."""
+    if delimiter is None:
+        return line.split()
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(delimiter)]
+    reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
+    return [cell.strip() for cell in next(reader)]
+
+
+def layout_of(
+    head: str,
+    encoding: str,
+    path: Path,
+    names_line: int | None = None,
+    delimiters: Sequence[str | None] = _DELIMITERS,
+) -> Layout:
+    """Return the layout of the text that begins with ``head``.
+
+    ``names_line`` is the number of the line of names, from 1, where the user says it; one of
+    ``delimiters`` separates the cells. Raises ``InputError`` if there is no table of numbers.
+    """
+    lines = head.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    if not any(map(str.strip, lines)):
+        raise InputError(f"{path} is empty")
+    forced = re.fullmatch(r'"?sep=(.)"?\s*', lines[0])
+    start = 1 if forced else 0
+    labview = lines[0].startswith("LabVIEW Measurement")
+    blank = re.search(r"\S[ \t]+\S", head) is not None
+    there = [d for d in delimiters if (blank if d is None else d in head)]
+    options = (forced[1],) if forced else there or delimiters
+    found = [t for d in options if (t := _Table.find(lines, start, d, labview))]
+    if not found:
+        raise _no_table(lines, start, path)
+    table = max(found, key=lambda t: (t.rows > 0, t.cells > 1, t.strict, t.rows * t.cells, t.cells))
+    return table.layout(encoding, path, None if names_line is None else names_line - 1)
+
+
+def _too_wide(path: Path, columns: int) -> InputError:
+    return InputError(
+        f"{path} has {columns:,} columns or more; {COLUMNS_MAX:,} are read at most: see that it is "
+        f"the right file"
+    )
+
+
+def _no_table(lines: Sequence[str], start: int, path: Path) -> InputError:
+    data = [line for line in lines[start:] if holds_data(line)]
+    if not data:
+        return InputError(f"{path} is empty")
+    widest = max(line.count(mark) + 1 for line in data for mark in _DELIMITERS if mark)
+    if widest > COLUMNS_MAX:
+        return _too_wide(path, widest)
+    if len(data) == 1:
+        return InputError(f"{path} has a line of names and no data")
+    return InputError(
+        f"{path}: no two lines in a row are numbers; name the line of names with --names-line, and "
+        f"see that it is the right file"
+    )
+
+
+def holds_data(line: str) -> bool:
+    """Return True unless ``line`` is blank or a comment."""
+    text = line.strip(" \t\r\n\f\v;,|")  # a row of empty cells is blank
+    return bool(text) and not line.strip().startswith(_COMMENTS)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Lines of data from ``first`` on: ``rows`` lines of ``cells`` cells in the sample."""
+
+    lines: Sequence[str]
+    start: int
+    delimiter: str | None
+    labview: bool
+    first: int
+    cells: int
+    rows: int
+    sample: tuple[tuple[str, ...], ...]
+    strict: bool  # all cells of its first lines are numbers
+
+    @classmethod
+    def find(
+        cls, lines: Sequence[str], start: int, delimiter: str | None, labview: bool
+    ) -> _Table | None:
+        """Return the table that ``delimiter`` splits ``lines`` into; None if there is none."""
+        places = [i for i in range(start, len(lines)) if holds_data(lines[i])]
+
+        @functools.cache  # most lines are never split
+        def row(number: int) -> list[str]:
+            return cells_of(lines[places[number]], delimiter)
+
+        # numbers only, then mostly numbers, then one row of numbers below a line of names
+        for strict, least in ((True, _LEAST), (False, _LEAST), (True, 1)):
+            good = functools.partial(_is_data, strict=strict)
+            for at in range(0 if least > 1 else 1, len(places) - least + 1):
+                run = [row(i) for i in range(at, at + least)]
+                beside = run if least > 1 else [row(at - 1), *run]
+                if len({len(cells) for cells in beside}) > 1 or not all(map(good, run)):
+                    continue
+                width = len(run[0])
+                # rows with a cell that is no number may stand first
+                while strict and least > 1 and at > 0 and places[at - 1] == places[at] - 1:
+                    if len(row(at - 1)) != width or not _is_data(row(at - 1), strict=False):
+                        break
+                    at -= 1
+                every = map(row, range(at, len(places)))
+                below = (cells for cells in every if len(cells) == width and good(cells))
+                like = tuple(tuple(cells) for cells in itertools.islice(below, _SAMPLE))
+                return cls(
+                    lines, start, delimiter, labview, places[at], width, len(like), like, strict
+                )
+        return None
+
+    def layout(self, encoding: str, path: Path, names_line: int | None) -> Layout:
+        """Return the layout of the file, with the names that stand above the table."""
+        if self.cells > COLUMNS_MAX:
+            raise _too_wide(path, self.cells)
+        line, names, units = self._names(path, names_line)
+        if self.labview:
+            units = units or self._labview_units()
+        groups = self._groups(line, names)
+        columns, notes = self._columns(names, units, groups)
+        used = self.first if line < 0 else line
+        block = tuple(
+            tuple(c for c in cells_of(_bare(text), self.delimiter) if c)
+            for text in self.lines[self.start : used]
+            if text.strip()
+        )
+        return Layout(
+            encoding, self.delimiter, self.first, line, self.cells, _unique(columns), block,
+            self._step(names, units, block), (*notes, *self._passed_over(line)),
+        )  # fmt: skip
+
+    def _names(self, path: Path, given: int | None) -> tuple[int, list[str], list[str]]:
+        """Return the line of the names, the names, and the units below them."""
+        above = [
+            i
+            for i in range(self.first - 1, self.start - 1, -1)
+            if self.lines[i].strip() and not _RULE.fullmatch(self.lines[i])
+        ]
+        if given is not None:
+            if given not in above:
+                raise InputError(
+                    f"{path}: line {given + 1} is no line of names: the numbers begin in line "
+                    f"{self.first + 1}"
+                )
+            between = [i for i in above if i > given]
+            units = self._split(between[0]) if between else []
+            return given, self._split(given), units if _are_units(units) else []
+        if not above:
+            return -1, [], []
+        cells = self._split(above[0])
+        if len(above) > 1 and _are_units(cells):
+            names = self._split(above[1])
+            if self._are_names(names) or (len(names) == len(cells) and _are_all_units(cells)):
+                return above[1], names, cells
+        if not self._are_names(cells):
+            return -1, [], []
+        units = self._split(above[1]) if len(above) > 1 else []
+        # some programs write the units above the names
+        return above[0], cells, units if len(units) == len(cells) and _are_all_units(units) else []
+
+    def _labview_units(self) -> list[str]:
+        """Return the units that the head of a LabVIEW file gives, by the place of the column."""
+        rows = (self._split(line) for line in range(self.start, self.first))
+        return next((row for row in rows if row[:1] == ["Y_Unit_Label"]), [])
+
+    def _split(self, line: int) -> list[str]:
+        text = _bare(self.lines[line])
+        cells = cells_of(text, self.delimiter)
+        if text != self.lines[line].strip() and len(cells) != self.cells:
+            # names in a comment may be separated in another way
+            for other in _DELIMITERS:
+                if len(split := cells_of(text, other)) == self.cells:
+                    return split
+        if self.delimiter is None and len(cells) != self.cells:
+            # names have single blanks in them, or units in brackets behind them
+            for wide in (re.split(r"\s{2,}|\t", text.strip()), _with_brackets(cells)):
+                if len(wide) == self.cells:
+                    return wide
+        return cells
+
+    def _are_names(self, cells: list[str]) -> bool:
+        if self.delimiter is None and len(cells) != self.cells:
+            return False  # which is above which column cannot be told
+        used = max(i for row in self.sample for i, cell in enumerate(row) if cell) + 1
+        named = [cell for cell in cells if cell]
+        numbers = sum(is_number(cell) for cell in named)
+        return len(cells) >= used and len(named) > 0 and numbers == 0
+
+    def _groups(self, line: int, names: list[str]) -> list[str]:
+        """Return the specimen or table of each column; empty where there is only one.
+
+        A line above the names may say it, each at its first column, as merged cells of a
+        spreadsheet do; without one, names that repeat as a whole are numbered.
+        """
+        none = [""] * self.cells
+        named = [name for name in names[: self.cells] if name]
+        above = next((i for i in range(line - 1, self.start - 1, -1) if self.lines[i].strip()), -1)
+        if line >= 0 and above >= 0:
+            titles = (self._split(above) + none)[: self.cells]
+            starts = [i for i, title in enumerate(titles) if title]
+            blocks = [
+                set(filter(None, names[a:b])) for a, b in itertools.pairwise([*starts, self.cells])
+            ]
+            words = not any(is_number(titles[i]) for i in starts)
+            if len(starts) > 1 and words and all(blocks) and blocks[0] & blocks[1]:
+                found = list(none)
+                for a, b in itertools.pairwise([*starts, self.cells]):
+                    found[a:b] = [titles[a]] * (b - a)
+                return found
+        once = len(set(named))
+        if once < 2 or once == len(named) or named != named[:once] * (len(named) // once):
+            return none
+        found, seen = list(none), 0
+        for place, name in enumerate(names[: self.cells]):
+            if name:
+                found[place] = str(seen // once + 1)
+                seen += 1
+        return found
+
+    def _columns(
+        self, names: list[str], units: list[str], groups: list[str]
+    ) -> tuple[list[Column], list[str]]:
+        """Return the columns with values in the sample, and notes on their numbers."""
+        cells = {
+            place: there
+            for place in range(self.cells)
+            if (there := [row[place] for row in self.sample if row[place]])
+        }
+        moments = {p: next(filter(None, map(moment_of, column)), None) for p, column in
+                   cells.items()}  # fmt: skip
+        timed = {place: moment for place, moment in moments.items() if moment is not None}
+        numbers = {place: column for place, column in cells.items() if place not in timed}
+        signs = dict(zip(numbers, signs_of([*numbers.values()]), strict=True))
+        found: list[Column] = []
+        notes: list[str] = []
+        for place, column in cells.items():
+            name = names[place] if place < len(names) and names[place] else f"#{place + 1}"
+            unit = units[place] if place < len(units) else ""
+            group, of = groups[place], signs.get(place, Signs())
+            if place in timed:
+                first = day_first_or_open(column)
+                since = next(filter(None, (moment_of(cell, first) for cell in column)), None)
+                found.append(
+                    Column(
+                        name, place, "s", since=since or timed[place], group=group,
+                        day_first=first, is_open=any(map(is_open_date, column)),
+                    )
+                )  # fmt: skip
+                continue
+            if of.open and of.decimal == ",":
+                cell = next(cell for cell in column if "," in cell)
+                notes.append(
+                    f"{cell!r} in column {name!r} is read as {cell.replace(',', '.')}: nothing in "
+                    f"the file says whether the comma is of decimals"
+                )
+            found.append(Column(name, place, unit, of.decimal, of.thousands, group=group))
+        return found, notes
+
+    def _passed_over(self, line: int) -> list[str]:
+        """Return a note on rows of numbers between the names and the first row that is read."""
+        begin = self.start if line < 0 else line + 1
+        rows = [
+            number for number in range(begin, self.first)
+            if holds_data(self.lines[number]) and any(map(is_number, self._split(number)))
+            and len(self._split(number)) == self.cells
+        ]  # fmt: skip
+        if not rows:
+            return []
+        return [
+            f"the table begins in line {self.first + 1}: line {rows[0] + 1}"
+            + (f" and {len(rows) - 1} more" if len(rows) > 1 else "")
+            + " above it were not taken for rows"
+        ]
+
+    def _step(
+        self, names: list[str], units: list[str], block: tuple[tuple[str, ...], ...]
+    ) -> float | None:
+        """Return the time from row to row that the head of an instrument's file gives."""
+        lowered = [name.lower() for name in names]
+        if "increment" in lowered and (at := lowered.index("increment")) < len(units):
+            return _positive(units[at])
+        steps = [row[1] for row in block if len(row) > 1 and row[0] == "Delta_X"]
+        return _positive(steps[-1]) if self.labview and steps else None
+
+
+def _positive(text: str) -> float | None:
+    try:
+        value = float(text.replace(",", "."))
+    except ValueError:
+        return None
+    return value if 0.0 < value < float("inf") else None
+
+
+def _with_brackets(cells: Sequence[str]) -> list[str]:
+    """Return ``cells`` with those in brackets behind the cell before them."""
+    found: list[str] = []
+    for cell in cells:
+        if found and cell[:1] in "[(":
+            found[-1] += f" {cell}"
+        else:
+            found.append(cell)
+    return found
+
+
+def _bare(line: str) -> str:
+    """Return ``line`` without the sign of a comment before it."""
+    return line.strip().lstrip("#%/;").strip() if line.strip().startswith(_COMMENTS) else line
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Return True if ``cells`` are a line of units; an oscilloscope has numbers beside them."""
+    named = [c for c in cells if c and not is_number(c)]
+    known = [c for c in named if unit_of(c) is not None]
+    return len(known) > 0 and len(known) >= len(named) - 1
+
+
+def _are_all_units(cells: Sequence[str]) -> bool:
+    """Return True if ``cells`` are units and nothing else; numbers above them name channels."""
+    return all(not c or (not is_number(c) and unit_of(c) is not None) for c in cells)
+
+
+def _unique(columns: Sequence[Column]) -> tuple[Column, ...]:
+    """Return ``columns`` with the group before their names, and the place behind repeated ones."""
+    seen: Counter[str] = Counter()
+    found = []
+    for column in columns:
+        name = f"{column.group}/{column.name}" if column.group else column.name
+        seen[name] += 1
+        if seen[name] > 1:
+            name = f"{name} #{column.place + 1}"
+        found.append(replace(column, name=name, own=column.name))
+    return tuple(found)
+
+
+def is_row(line: str, layout: Layout) -> bool:
+    """Return True if ``line`` is one of the table's rows, most of whose cells are numbers."""
+    if not holds_data(line):
+        return False
+    try:
+        cells = cells_of(line, layout.delimiter)
+    except csv.Error:
+        return False
+    return len(cells) == layout.cells and _is_data(cells, strict=False)
+
+
+def _is_data(cells: Sequence[str], strict: bool) -> bool:
+    """Return True if ``cells`` are a row of numbers; if not ``strict``, mostly numbers."""
+    numbers = sum(is_number(cell) or moment_of(cell) is not None for cell in cells)
+    words = sum(bool(cell) for cell in cells) - numbers
+    return numbers > words if not strict else numbers > 0 and words == 0

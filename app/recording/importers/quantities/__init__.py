@@ -1,0 +1,1 @@
+"""Which quantity and unit a name or a cell states."""

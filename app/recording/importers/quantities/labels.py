@@ -1,0 +1,275 @@
+"""Quantities of columns, by names in English, German, French, Chinese and Japanese.
+
+``voltage_kV`` is the name that this program gives a voltage in kV: the quantity and the unit.
+Files of other programs call it ``Voltage [kV]``, ``Spannung / kV`` or ``Tension (kV)``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import unicodedata
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from dearig.errors import InputError
+from dearig.recording.importers.quantities.units import UNITS, WIDE_BRACKETS, Scale, unit_of
+
+__all__ = [
+    "DIMENSIONS",
+    "Label",
+    "Target",
+    "has_east_asian_name",
+    "label_of",
+    "names_of",
+    "suggestion",
+    "target_name",
+    "target_of",
+]
+
+#: Dimension of each quantity that a recording is made of.
+DIMENSIONS = MappingProxyType(
+    {
+        "time": "time",
+        "voltage": "voltage",
+        "voltage_monitor": "voltage",
+        "current": "current",
+        "displacement": "length",
+        "temperature": "temperature",
+        "stretch": "stretch",
+        "strain": "strain",
+        "nominal_stress": "stress",
+        "force": "force",
+    }
+)
+
+
+def _plain(text: str) -> str:
+    """Return ``text`` in small letters without accents."""
+    apart = unicodedata.normalize("NFKD", text.casefold())
+    return "".join(c for c in apart if not unicodedata.combining(c))
+
+
+#: Words of a name, without accents and in small letters, by quantity. A name that is written
+#: together, such as Standardkraft, counts by its end.
+_WORDS = MappingProxyType(
+    {
+        "time": "time zeit temps timestamp zeitstempel datetime elapsed t",
+        "voltage_monitor": "monitor moniteur vmon",
+        "voltage": "voltage volt volts spannung tension hv highvoltage hochspannung u v potential "
+        "potentiel",
+        "current": "current curr strom courant i imon leakage",
+        "temperature": "temperature temperatur temp",
+        "stretch": "stretch lambda λ streckung streckgrad",
+        "strain": "strain dehnung deformation verformung",
+        "nominal_stress": "stress contrainte spannung zugspannung nennspannung",
+        "force": "force load kraft last charge effort f",
+        "displacement": "displacement disp displ deflection lvdt travel extension weg verschiebung "
+        "deplacement stroke hub position elongation auslenkung langenanderung allongement "
+        "verlangerung laser crosshead traverse course dehnung",
+    }
+)
+_QUANTITIES_OF: dict[str, list[str]] = {}
+for _quantity, _names in _WORDS.items():
+    for _word in _names.split():
+        _QUANTITIES_OF.setdefault(_word, []).append(_quantity)
+#: Ends of German names that are written together.
+_ENDS = ("kraft", "spannung", "weg", "zeit", "dehnung", "strom", "verschiebung", "temperatur")
+
+#: Ends of Chinese and Japanese names, by quantity; what ends another one is after it.
+_EAST_ASIAN = MappingProxyType(
+    {
+        "time": "时间 時間 时刻 時刻",
+        "voltage_monitor": "电压监测 電圧モニタ",
+        "voltage": "电压 電圧 電壓",
+        "current": "电流 電流",
+        "temperature": "温度 溫度",
+        "stretch": "伸长比 拉伸比 伸張比",
+        "strain": "应变 應變 ひずみ 歪み 伸长率",
+        "nominal_stress": "应力 応力 應力",
+        "displacement": "位移 変位 伸长 伸長 伸び 行程 ストローク",
+        "force": "载荷 负荷 荷重 荷载 力值 试验力 試験力 拉力 力",
+    }
+)
+_EAST_ASIAN_ENDS = tuple(
+    (_plain(end), quantity) for quantity, ends in _EAST_ASIAN.items() for end in ends.split()
+)
+#: Ends of a pressure, which is no force.
+_EAST_ASIAN_OTHERS = ("压力", "圧力", "壓力")
+
+#: Words of a quantity of another kind: true stress is no nominal stress, a speed is no travel.
+_OTHERS = frozenset(
+    re.findall(
+        r"\w+",
+        """true wahre vraie cauchy rate speed velocity geschwindigkeit vitesse target setpoint
+        sollwert set limit error std model power energy energie nr no number cycle zyklus cycles""",
+    )
+)
+
+
+@dataclass(frozen=True)
+class Label:
+    """What a column's name says: quantities that it may be, and its unit, empty if it has none.
+
+    ``unit`` is a symbol of ``UNITS``, ``dimensions`` are those that the symbol belongs to. ``raw``
+    is the quantity of an instrument's output in volts, such as a laser's. ``unknown`` is what
+    seems to be a unit and is none of ``UNITS``.
+    """
+
+    name: str
+    quantities: tuple[str, ...] = ()
+    unit: str = ""
+    dimensions: tuple[str, ...] = ()
+    raw: str = ""
+    unknown: str = ""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A column of a recording as it is asked for: a quantity and the unit of the source.
+
+    ``raw`` columns are volts at the card's inputs, which the rig file's scaling converts.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    raw: bool = False
+
+    @property
+    def scale(self) -> Scale:
+        """Scale to the unit of the recording."""
+        return UNITS[DIMENSIONS[self.quantity]][self.unit]
+
+
+#: Name of a column whose values are volts at the card, by quantity.
+RAW = MappingProxyType(
+    {"displacement_raw_V": "displacement", "voltage_raw_V": "voltage",
+     "voltage_monitor_raw_V": "voltage_monitor", "current_raw_V": "current"}
+)  # fmt: skip
+
+
+def target_of(name: str) -> Target:
+    """Return the target called ``name``. Raises ``InputError`` for a name that none has."""
+    if name in RAW:
+        return Target(name, RAW[name], "V", raw=True)
+    for quantity, dimension in DIMENSIONS.items():
+        units = UNITS[dimension]
+        if "1" in units and name == quantity:
+            return Target(name, quantity, "1")
+        if name.startswith(f"{quantity}_") and name.removeprefix(f"{quantity}_") in units:
+            return Target(name, quantity, name.removeprefix(f"{quantity}_"))
+    like = next((q for q in sorted(DIMENSIONS, key=len, reverse=True) if name.startswith(q)), "")
+    hint = (
+        f": {like} may be {names_of(like)}"
+        if like
+        else suggestion([name], [target_name(q, u) for q in DIMENSIONS for u in _units(q)])
+    )
+    raise InputError(
+        f"{name!r} is not a column of a recording{hint}; a name is a quantity and its unit, such "
+        f"as voltage_kV; quantities are {', '.join(DIMENSIONS)}"
+    )
+
+
+def target_name(quantity: str, unit: str) -> str:
+    """Return the name of the target of ``quantity`` in ``unit``."""
+    return quantity if unit == "1" else f"{quantity}_{unit}"
+
+
+def _units(quantity: str) -> list[str]:
+    return list(UNITS[DIMENSIONS[quantity]])
+
+
+def names_of(quantity: str) -> str:
+    """Return the names that a column of ``quantity`` may have, for a message."""
+    return ", ".join(target_name(quantity, unit) for unit in _units(quantity))
+
+
+def label_of(name: str, unit: str = "") -> Label:
+    """Return what the column ``name`` says; ``unit`` is what the file says of it elsewhere."""
+    words, found = name, unit_of(unit) if unit else None
+    bracketed = name.strip().translate(_BRACKETS)
+    inside = [text for text in _IN_BRACKETS.findall(bracketed) if unit_of(text)]
+    if len(inside) > 1:  # a number beside a unit counts: Force (1) [N]
+        inside = [text for text in inside if text.strip() != "1"]
+    if len(inside) == 1:
+        words, found = bracketed.replace(f"[{inside[0]}]", " "), unit_of(inside[0])
+    for pattern in () if inside else _UNIT_IN_NAME:
+        match = pattern.fullmatch(bracketed)
+        if match and "[" not in match["name"] and (known := unit_of(match["unit"])):
+            words, found = match["name"], known
+            break
+    symbol, dimensions = found or ("", ())
+    unknown = "" if found else unit or _unknown_unit(name)
+    quantities = _quantities(words)
+    raw = ""
+    if found:
+        # the output of a laser or of a monitor in volts is no voltage at the film
+        raw = next((q for q in quantities if dimensions == ("voltage",) and q in _RAW), "")
+        if raw and raw != "voltage_monitor":
+            quantities = []
+        quantities = [q for q in quantities if DIMENSIONS[q] in dimensions]
+    return Label(name, tuple(quantities), symbol, dimensions, raw, unknown)
+
+
+def _unknown_unit(name: str) -> str:
+    """Return a short text in brackets at the end of ``name``, which may be a unit, or ""."""
+    bracketed = name.strip().translate(_BRACKETS)
+    inside = _IN_BRACKETS.findall(bracketed)[-1].strip() if bracketed.endswith("]") else ""
+    return inside if len(inside) <= UNIT_MAX and re.match(r"[^\W\d]|°|%", inside) else ""
+
+
+#: Characters of a unit, at most: (measured) is none.
+UNIT_MAX = 7
+_RAW = ("displacement", "current", "voltage_monitor")
+_BRACKETS = str.maketrans(f"(){WIDE_BRACKETS}", "[][]")
+_IN_BRACKETS = re.compile(r"\[([^\[\]]+)\]")
+_UNIT_IN_NAME = (
+    re.compile(r"(?P<name>.*\S)\s*,\s*(?P<unit>\S+)"),
+    re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)"),
+    re.compile(r"(?P<name>.*[^\s/])\s*/\s*(?P<unit>\S+)"),
+    re.compile(r"(?P<name>.*[^_.\s])[_.\s]+(?P<unit>[^_.\s]+)"),
+)
+
+
+def _quantities(name: str) -> list[str]:
+    """Return the quantities that the words of ``name`` stand for."""
+    words = re.findall(r"[^\W\d_]+", _plain(name))
+    if _OTHERS.intersection(words):
+        return []
+    found: list[str] = []
+    for word in words:
+        known = _QUANTITIES_OF.get(word)
+        if known is None:
+            end = next((e for e in _ENDS if word.endswith(e)), "")
+            known = _QUANTITIES_OF.get(end) or _east_asian(word)
+        if len(word) > 1 or len(words) == 1:  # a letter among words is an index
+            found += [q for q in known if q not in found]
+    if "voltage_monitor" in found:  # of the voltage, unless its name says of what
+        found = [q for q in found if q in ("current", "displacement")] or ["voltage_monitor"]
+    return found
+
+
+def _east_asian(word: str) -> list[str]:
+    """Return the quantity of a Chinese or Japanese name without accents, as a list."""
+    if word.endswith(_EAST_ASIAN_OTHERS):
+        return []
+    return [quantity for end, quantity in _EAST_ASIAN_ENDS if word.endswith(end)][:1]
+
+
+def has_east_asian_name(text: str) -> bool:
+    """Return whether ``text`` has a Chinese or Japanese name of a quantity, of two characters."""
+    ends = (end for ends in _EAST_ASIAN.values() for end in ends.split())
+    return any(len(end) > 1 and end in text for end in ends)
+
+
+def suggestion(wanted: Iterable[str], there: Iterable[str]) -> str:
+    """Return ``; did you mean 'x'?`` for the name ``there`` nearest to one ``wanted``, or ""."""
+    listed = list(there)
+    lowered = {name.lower(): name for name in reversed(listed)}
+    for name in wanted:
+        near = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
+        if near:
+            return f"; did you mean {lowered[near[0]]!r}?"
+    return ""

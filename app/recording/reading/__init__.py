@@ -1,0 +1,1 @@
+"""Recordings opened and read."""

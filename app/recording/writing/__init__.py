@@ -1,0 +1,1 @@
+"""Recordings written, during a run and after it."""

@@ -1,0 +1,1 @@
+"""Pages of reports: HTML in one file, and its printing."""

@@ -1,0 +1,380 @@
+"""HTML report of a diagnosis: errors before and after, and the evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from dearig.report.figures import diagnosis as drawn
+from dearig.report.figures.recordings import comparison_figure
+from dearig.report.figures.residual import bin_words, residual_panels
+from dearig.report.pages.head import head_of, origins_of
+from dearig.report.pages.html import Picture, picture, prefixes, write_page
+from dearig.report.text.diagnosis import (
+    before_after_table,
+    dropped_effects,
+    effect_table,
+    estimate_table,
+    experiment_table,
+    family_label,
+    headline,
+    rankings,
+    step_label,
+    step_table,
+    summary,
+    thesis_before_after_table,
+    warnings,
+)
+from dearig.report.text.numbers import seconds, significant
+from dearig.report.text.sentences import describe_model
+from dearig.report.text.tables import Table
+from dearig.units import SHOWN, readable
+
+if TYPE_CHECKING:
+    from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
+    from dearig.model.residual import MissingStress, Signature
+
+__all__ = ["write_diagnosis_report"]
+
+_Of = TypeVar("_Of", "Signature", "MissingStress")
+
+#: Recordings whose residuals are drawn; more would make the page long.
+_DRAWN_MAX = 2
+_VALIDATION_MAX = 6
+
+
+@dataclass(frozen=True)
+class Group:
+    """Section of one recording: sentences, wide figures, small figures."""
+
+    name: str
+    words: tuple[str, ...]
+    wide: tuple[Picture, ...]
+    small: tuple[Picture, ...]
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """Section of one effect."""
+
+    title: str
+    about: str
+    evidence: tuple[str, ...]
+    curves: tuple[Picture, ...] = ()
+
+
+@dataclass(frozen=True)
+class DiagnosisPage:
+    """Values of the template; empty tuples leave their sections out."""
+
+    headline: str
+    summary: tuple[str, ...]
+    warnings: tuple[str, ...]
+    errors: tuple[tuple[str, tuple[Table, ...]], ...]
+    bars: tuple[Picture, ...]
+    step_table: Table
+    pictures: tuple[Picture, ...]
+    steps: tuple[FoundEffect, ...]
+    effects: Table
+    unnamed: tuple[str, ...]
+    residuals: tuple[Group, ...]
+    missing: tuple[Group, ...]
+    rankings: tuple[tuple[Table, Table], ...]
+    dropped_effects: str
+    after: tuple[tuple[str, tuple[str, ...]], ...]
+    after_pictures: tuple[Picture, ...]
+    experiment_words: str
+    experiments: tuple[Table, ...]
+    sequence: str
+    parameters: Table
+    provenance: tuple[tuple[str, tuple[str, ...]], ...]
+    film: bool
+
+
+def write_diagnosis_report(outcome: DiagnoseOutcome, path: str | Path) -> Path:
+    """Write the report of a diagnosis to ``path``. Raises ``InputError``."""
+    title = f"Missing effects: {outcome.title}"
+
+    def contents() -> dict[str, Any]:
+        return {
+            "d": _page(outcome, prefixes()),
+            "title": title,
+            "lead": "Diagnosis",
+            "head": head_of(origins_of((*outcome.after.train, *outcome.after.validation))),
+        }
+
+    return write_page(path, "diagnosis.html.j2", contents)
+
+
+def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
+    finding, kind = outcome.finding, outcome.kind
+    changed = bool(finding.steps)
+    errors = []
+    for heading, before, after in (
+        ("Validation recordings", outcome.before.validation, outcome.after.validation),
+        ("Training recordings", outcome.before.train, outcome.after.train),
+    ):
+        if before and after:
+            ours = before_after_table("Measured minus model", before, after, kind)
+            theirs = thesis_before_after_table("By the thesis's formulas", before, after, kind)
+            errors.append((heading, (ours, theirs)))
+    pairs = [
+        *_paired(outcome.before.validation, outcome.after.validation),
+        *_paired(outcome.before.train, outcome.after.train),
+    ]
+    bars: tuple[Picture, ...] = ()
+    if pairs:
+        bars = (
+            picture(
+                drawn.bars_figure(pairs, outcome.noise, kind),
+                names,
+                "RMS error of every recording with the thesis model (before) and with the effects "
+                "found (after). An error at the noise floor is noise alone.",
+            ),
+        )
+    experiments = experiment_table(outcome)
+    worst = sorted(finding.before, key=lambda s: -s.rms / s.noise)[:_DRAWN_MAX]
+    return DiagnosisPage(
+        headline=headline(outcome),
+        summary=summary(outcome),
+        warnings=warnings(outcome),
+        errors=tuple(errors),
+        bars=bars,
+        step_table=step_table(outcome),
+        pictures=_validation_pictures(outcome, changed, names),
+        steps=_steps(outcome, names),
+        effects=effect_table(outcome),
+        unnamed=_unnamed(outcome),
+        residuals=tuple(_residual(s, outcome, changed, names) for s in worst),
+        missing=tuple(
+            _missing(m, outcome, changed, names)
+            for m in finding.missing_before
+            if any(m.record == s.record for s in worst)
+        ),
+        rankings=_rankings(outcome),
+        dropped_effects=_capitalised(dropped_effects(outcome)),
+        after=tuple(
+            (s.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in s.words))
+            for s in finding.after
+        ),
+        after_pictures=_after_pictures(outcome, worst, names),
+        experiment_words=readable(_with_full_stop(outcome.experiment_words)),
+        experiments=() if experiments is None else (experiments,),
+        sequence="" if outcome.experiment is None else outcome.experiment.sequence.strip(),
+        parameters=estimate_table(finding.final.estimates),
+        provenance=_provenance(outcome),
+        film=kind == "film",
+    )
+
+
+def _paired(
+    before: tuple[Comparison, ...], after: tuple[Comparison, ...]
+) -> list[tuple[Comparison, Comparison]]:
+    first = {c.name: c for c in before}
+    return [(first[c.name], c) for c in after if c.name in first]
+
+
+def _steps(outcome: DiagnoseOutcome, names: Iterator[str]) -> tuple[FoundEffect, ...]:
+    from dearig.model.effects import EFFECTS
+
+    found = []
+    for step in outcome.finding.steps:
+        about = _with_full_stop(EFFECTS[step.effect].summary)
+        against: tuple[str, ...] = ()
+        if step.indistinguishable_from:
+            others = ", ".join(family_label(f) for f in step.indistinguishable_from)
+            against = (f"Evidence against: {others} would explain these data equally well.",)
+        curves: tuple[Picture, ...] = ()
+        if (curve := step.curve) is not None:
+            curves = (picture(drawn.curve_figure(curve), names, "The form that was found."),)
+        found.append(
+            FoundEffect(
+                _capitalised(step_label(step)),
+                _capitalised(about),
+                (*(readable(_with_full_stop(_capitalised(w))) for w in step.evidence), *against),
+                curves,
+            )
+        )
+    return tuple(found)
+
+
+def _rankings(outcome: DiagnoseOutcome) -> tuple[tuple[Table, Table], ...]:
+    """Return for each round the table of the leading candidates, and that of all others."""
+    found = []
+    for table, made in zip(rankings(outcome), outcome.finding.rounds, strict=True):
+        leads = [c.verdict in ("chosen", "indistinguishable") for c in made.candidates]
+        sides = [
+            tuple(row for row, lead in zip(table.rows, leads, strict=True) if lead is wanted)
+            for wanted in (True, False)
+        ]
+        found.append((replace(table, rows=sides[0]), replace(table, rows=sides[1], note="")))
+    return tuple(found)
+
+
+def _unnamed(outcome: DiagnoseOutcome) -> tuple[str, ...]:
+    unnamed = outcome.finding.unnamed
+    if unnamed is None:
+        return ()
+    said = [f"It acts on the {unnamed.acts_on}."]
+    if unnamed.signature:
+        said.append(_with_full_stop(_capitalised(unnamed.signature)))
+    if unnamed.expression:
+        said.append(f"As a formula: {unnamed.expression}")
+    return tuple(readable(s) for s in said)
+
+
+def _residual(
+    before: Signature, outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
+) -> Group:
+    kind = outcome.kind
+    after = _same(outcome.finding.after, before.record) if changed else None
+    words = [
+        *before.words,
+        f"the correlation time of the residual is {_duration(before.correlation_time)}; noise "
+        f"alone is as correlated with probability {_probability(before.ljung_box_p)} "
+        f"(Ljung-Box test), and changes its sign as seldom with probability "
+        f"{_probability(before.runs_p)} (runs test)",
+    ]
+    when = "before and after, each on its own scale" if after is not None else "over time"
+    wide = (
+        picture(
+            drawn.residual_time_figure(before, after, kind),
+            names,
+            f"{before.record}: measured minus model, {when}. Dashed lines are the noise floor.",
+        ),
+        picture(
+            drawn.spectra_figure(before, after, kind),
+            names,
+            f"{before.record}: amplitude density of the residual. White noise would follow the "
+            f"dashed line.",
+        ),
+    )
+    small = tuple(
+        picture(
+            drawn.dependence_figure(d, kind),
+            names,
+            f"Residual before, against {d.quantity}, which alone explains "
+            f"{significant(100.0 * d.explained, 2)} % of its variance.",
+        )
+        for d in before.dependences
+    )
+    return Group(
+        before.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in words), wide, small
+    )
+
+
+def _missing(
+    missing: MissingStress, outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
+) -> Group:
+    after = _same(outcome.finding.missing_after, missing.record) if changed else None
+    size = math.sqrt(float(np.mean(missing.stress**2)))
+    what = "Maxwell stress" if outcome.kind == "actuator" else "measured stress"
+    words = [
+        f"The missing stress is {significant(size)} Pa RMS, "
+        f"{significant(100.0 * size / missing.scale, 2)} % of the {what} "
+        f"({significant(missing.scale)} Pa RMS)."
+    ]
+    if after is not None:
+        left = math.sqrt(float(np.mean(after.stress**2)))
+        words.append(f"With the effects found, {significant(left)} Pa RMS remain.")
+    wide = (
+        picture(
+            drawn.missing_time_figure(missing, after),
+            names,
+            f"{missing.record}: missing stress over time, low-pass filtered at "
+            f"{significant(missing.band, 2)} Hz.",
+        ),
+    )
+    small = tuple(
+        picture(figure, names, f"Missing stress before, against {name}.")
+        for name, figure in drawn.missing_figures(missing, outcome.kind)
+    )
+    return Group(missing.record, tuple(words), wide, small)
+
+
+def _validation_pictures(
+    outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
+) -> tuple[Picture, ...]:
+    shown = SHOWN[outcome.kind]
+    found = []
+    for before, after in _paired(outcome.before.validation, outcome.after.validation)[
+        :_VALIDATION_MAX
+    ]:
+        label = f"{after.name} ({after.row})" if after.row else after.name
+        last = f"{significant(after.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
+        if not changed:
+            found.append(picture(comparison_figure(after), names, f"{label}: {last}."))
+            continue
+        first = f"{significant(before.errors.rms * shown.error_factor)}"
+        found.append(
+            picture(
+                drawn.before_after_figure(before, after),
+                names,
+                f"{label}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by both "
+                f"models, and the error before ({first}) and after ({last}); the "
+                f"error axes have different scales.",
+            )
+        )
+    return tuple(found)
+
+
+def _after_pictures(
+    outcome: DiagnoseOutcome, worst: list[Signature], names: Iterator[str]
+) -> tuple[Picture, ...]:
+    """Draw histogram, correlation and spectrum of the final residual of the worst recording."""
+    chosen = [c for c in outcome.after.train if worst and c.name == worst[0].record]
+    if not chosen:
+        return ()
+    captions = (
+        f"histogram of the error{bin_words(chosen[0])}, and the distribution of noise alone.",
+        "autocorrelation of the error; that of noise lies in the grey band.",
+        "amplitude density of the error; that of white noise is flat.",
+    )
+    return tuple(
+        picture(figure, names, f"{chosen[0].name}, after: {caption}")
+        for figure, caption in zip(residual_panels(chosen[0]), captions, strict=True)
+    )
+
+
+def _provenance(outcome: DiagnoseOutcome) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    finding = outcome.finding
+    every = (*outcome.after.train, *outcome.after.validation)
+    rows = [
+        ("Fitted to", tuple(c.name for c in outcome.after.train)),
+        ("Validated on", tuple(c.name for c in outcome.after.validation) or ("no recording",)),
+        ("Samples", (f"{sum(c.errors.samples for c in every):,}",)),
+        ("Driven by", (f"voltage {outcome.drive}" if outcome.kind == "actuator" else "stretch",)),
+        ("Baseline", (describe_model(finding.baseline.model),)),
+        ("Model", (describe_model(finding.final.model),)),
+        ("Model file", (outcome.model_path or "not written",)),
+        ("Simulations", (f"{finding.simulations:,}",)),
+        ("Computing time", (seconds(outcome.seconds),)),
+    ]
+    if outcome.rig:
+        rows.insert(0, ("Rig", (outcome.rig,)))
+    return tuple(rows)
+
+
+def _same(of: Sequence[_Of], record: str) -> _Of | None:
+    return next((s for s in of if s.record == record), None)
+
+
+def _duration(value: float) -> str:
+    return f"{significant(value * 1e3)} ms" if value < 1.0 else seconds(value)
+
+
+def _probability(p: float) -> str:
+    return "below 0.001" if p < 1e-3 else significant(p, 2)
+
+
+def _capitalised(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _with_full_stop(text: str) -> str:
+    return text if text.endswith((".", "!", "?")) else f"{text}."

@@ -1,0 +1,574 @@
+"""Sentences and tables of a diagnosis, for the terminal, the window and the HTML page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
+from dearig.model.verdict import TOLERANCE
+from dearig.report.text.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
+from dearig.report.text.sentences import few_data_sentence, listed
+from dearig.report.text.tables import BOUND_MARK, Row, Table
+from dearig.units import SHOWN, parameter_unit, readable
+
+if TYPE_CHECKING:
+    from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
+    from dearig.model.diagnosis.results import Round, Step
+    from dearig.model.fitting import Estimate
+    from dearig.model.readings.measures import Errors
+
+__all__ = [
+    "HEADLINES",
+    "before_after_table",
+    "dropped_effects",
+    "effect_table",
+    "estimate_table",
+    "experiment_table",
+    "family_label",
+    "headline",
+    "pooled_errors",
+    "ranking_table",
+    "rankings",
+    "step_label",
+    "step_table",
+    "summary",
+    "thesis_before_after_table",
+    "warnings",
+]
+
+#: Headline of each verdict, and of a verdict that is less than what the search found.
+HEADLINES = {
+    "nothing_missing": "No missing effect found",
+    "explained": "Residual explained",
+    "partly_explained": "Residual partly explained",
+    "unexplained": "Residual not explained by any known effect",
+}
+_LOWERED = {
+    "validation": "Training recordings explained, validation recordings not",
+    "selection": "Residual partly explained: the cross-validation error rises",
+    "training": "Residual partly explained: one training recording keeps more than noise",
+    "rest": "Nothing found, but the readings at rest move by more than their noise",
+    "stopped": "No missing effect found so far: not every effect was tried",
+}
+
+
+def pooled_errors(comparisons: Sequence[Comparison]) -> Errors | None:
+    """Return the errors over all samples of all recordings; None without recordings.
+
+    Relative errors refer to the range (or peak) of all recordings together, so that a recording
+    with a small range does not dominate.
+    """
+    from dearig.model.readings.measures import Errors
+
+    if not comparisons:
+        return None
+    rms = pooled_rms(comparisons)
+    largest = max(c.errors.max for c in comparisons)
+    tops = [(np.nanmin(c.measured), np.nanmax(c.measured)) for c in comparisons]
+    span = max(t[1] for t in tops) - min(t[0] for t in tops)
+    peak = max(abs(end) for ends in tops for end in ends)
+    model_span = max(c.model.max() for c in comparisons) - min(c.model.min() for c in comparisons)
+
+    def per_cent(value: float, of: float) -> float:
+        return 100.0 * value / of if of > 0.0 else math.inf
+
+    return Errors(
+        rms=rms,
+        nrmse_pct=per_cent(rms, float(span)),
+        max=largest,
+        peak_pct=per_cent(rms, float(peak)),
+        e_rms_thesis_pct=rms * 1e3 * 100.0,
+        e_m_thesis_pct=per_cent(largest, float(model_span)),
+        samples=sum(c.errors.samples for c in comparisons),
+    )
+
+
+# sentences
+
+
+def headline(outcome: DiagnoseOutcome) -> str:
+    """Return the headline: the verdict with the limits of what it rests on."""
+    finding, judgement = outcome.finding, outcome.judgement
+    if finding.interrupted and not finding.rounds:
+        tried = "all effects were" if finding.steps else "any effect was"
+        return f"Stopped before {tried} tried"
+    said = next((_LOWERED[r] for r in _LOWERED if r in judgement.reasons), "")
+    limits = []
+    if judgement.verdict == "explained" and any(s.indistinguishable_from for s in finding.steps):
+        limits.append("by which effect these data cannot tell")
+    if judgement.verdict in ("explained", "nothing_missing") and not outcome.after.validation:
+        limits.append("no validation recording was given")
+    ended = [c.marked_name for c in outcome.after.train if c.ended and not c.ended.is_cut]
+    if ended:
+        limits.append(f"ended early: {listed(ended)}")
+    if outcome.few_data:
+        limits.append(f"little data: {outcome.few_data}")
+    if outcome.status != "complete":
+        limits.append(_STATUS[outcome.status])
+    return "; ".join([said or HEADLINES[judgement.verdict], *limits])
+
+
+_STATUS = {
+    "stopped": "the search was stopped",
+    "budget": "the search ended at its computing budget",
+}
+
+
+def family_label(family: str) -> str:
+    """Return the name of an effect family in words."""
+    return "no known family" if family == "unknown" else family.replace("_", " ")
+
+
+def step_label(step: Step) -> str:
+    """Return a step's effect with its family and the quantity that it acts on."""
+    family = "" if family_label(step.family) == step.effect else f"{family_label(step.family)}, "
+    return f"{step.effect} ({family}acting on the {step.acts_on})"
+
+
+def _with_rivals(step: Step) -> str:
+    """Return a step's label, and the families that explain these data as well."""
+    others = " or ".join(family_label(f) for f in step.indistinguishable_from)
+    return f"{step_label(step)}, or {others} in its place" if others else step_label(step)
+
+
+def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
+    """Return the verdict and its evidence as sentences."""
+    finding = outcome.finding
+    said = [*_doubts(outcome), _verdict(outcome)]
+    for role, before, after in (
+        ("the validation recordings, which no fit and no selection used,",
+         outcome.before.validation, outcome.after.validation),
+        ("the training recordings", outcome.before.train, outcome.after.train),
+    ):  # fmt: skip
+        if before and after:
+            said.append(_error_change(role, before, after, outcome, bool(finding.steps)))
+    if not outcome.after.validation:
+        said.append(
+            "No validation recordings were given: the errors do not show how well the model "
+            "predicts other recordings."
+        )
+    if outcome.few_data:
+        said.append(few_data_sentence(outcome.few_data))
+    said += _events(outcome)
+    said += [_rivals_sentence(step) for step in finding.steps if step.indistinguishable_from]
+    if finding.unnamed is not None:
+        said.append(_unnamed(outcome))
+    said += outcome.performed
+    if finding.rivals and outcome.experiment_words:
+        said.append(_sentence(outcome.experiment_words))
+    if outcome.status == "stopped":
+        said.append(
+            "The search was stopped. These are the results so far; a complete search may find more."
+        )
+    if outcome.status == "budget":
+        said.append(
+            "The search ended at its computing budget; a search with --thorough may find more."
+        )
+    return tuple(readable(s) for s in said)
+
+
+def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
+    """Yield a sentence for each reason for which the verdict is less than the search found."""
+    reasons, shown = outcome.judgement.reasons, SHOWN[outcome.kind]
+    baseline, final = outcome.finding.baseline, outcome.finding.final
+    if "validation" in reasons:
+        left = [
+            f"{c.name} keeps {significant(over, 2)} times its noise"
+            for c in outcome.after.validation
+            if (over := c.over_noise(outcome.noise)) > TOLERANCE
+        ]
+        left += [f"the model cannot follow {name}" for name in outcome.not_compared]
+        yield (
+            f"The model explains the training recordings, but not the validation recordings: "
+            f"{listed(left)}."
+        )
+    elif outcome.prediction_errors and any(
+        c.over_noise(outcome.noise) > TOLERANCE for c in outcome.after.validation
+    ):
+        yield (
+            "A validation recording keeps more than its noise; the uncertainty of the fitted "
+            "parameters is large enough to explain it."
+        )
+    if "selection" in reasons:
+        before, after = (
+            significant(stage.selection_rms * shown.error_factor) for stage in (baseline, final)
+        )
+        yield (
+            f"The cross-validation error rises from {before} to {after} {shown.error_unit}: the "
+            f"effects found do not predict the time segments that they were not fitted to."
+        )
+    if "training" in reasons:
+        left = [
+            f"{s.record} keeps {significant(s.rms / s.noise, 2)} times its noise"
+            for s in outcome.finding.after
+            if s.rms / s.noise > TOLERANCE
+        ]
+        yield f"Not every training recording is explained: {listed(left)}."
+    if "rest" in reasons:
+        moving = listed([c.name for c in outcome.after.train if c.moves_at_rest])
+        yield (
+            f"The readings of {moving} move slowly before the voltage. What moves there counts as "
+            f"noise, and was not found; effects that are smaller are hidden by it."
+        )
+
+
+def _verdict(outcome: DiagnoseOutcome) -> str:
+    finding, judgement = outcome.finding, outcome.judgement
+    names = [_with_rivals(s) for s in finding.steps]
+    lacks = f"The thesis model lacks {listed(names)}"
+    if finding.interrupted and not finding.rounds:
+        if finding.steps:
+            return (
+                "The search was stopped before all effects were tried. This effect is the best so "
+                "far; another one may be better."
+            )
+        return "The search was stopped before any effect was tried; there is no result yet."
+    if "stopped" in judgement.reasons:
+        return (
+            f"The thesis model explains the training recordings down to the noise"
+            f"{_film_tolerance(outcome)}. It is not known whether an effect is missing: the search "
+            f"was stopped before every effect was tried."
+        )
+    if judgement.reasons and not names:
+        return "No effect improves the thesis model on the training recordings by more than chance."
+    if judgement.reasons:
+        return f"{lacks}, as far as the training recordings show."
+    if judgement.verdict == "nothing_missing":
+        return (
+            f"The thesis model explains these recordings down to the noise"
+            f"{_film_tolerance(outcome) or ','} and no other effect improves it by more than "
+            f"chance."
+        )
+    if judgement.verdict == "explained":
+        return f"{lacks}. With {_them(names)}, only noise{_film_tolerance(outcome)} is left."
+    if judgement.verdict == "partly_explained":
+        return (
+            f"{lacks}. With {_them(names)}, part of the residual is explained; no known effect "
+            f"explains the rest."
+        )
+    helps = "helps" if len(names) == 1 else "help"
+    tried = f" {listed(names)} {helps}, but only a little." if names else ""
+    return f"The residual is more than noise, and no known effect explains it.{tried}"
+
+
+def _them(names: list[str]) -> str:
+    return "it" if len(names) == 1 else "them"
+
+
+def _film_tolerance(outcome: DiagnoseOutcome) -> str:
+    """Return the model error that a film model is allowed besides the noise."""
+    from dearig.model.diagnosis.preparation import FILM_MODEL_ERROR
+
+    film = outcome.kind == "film"
+    return f", or {100.0 * FILM_MODEL_ERROR:g} % of the largest stress," if film else ""
+
+
+def _error_change(
+    role: str,
+    before: Sequence[Comparison],
+    after: Sequence[Comparison],
+    outcome: DiagnoseOutcome,
+    changed: bool,
+) -> str:
+    shown = SHOWN[outcome.kind]
+    rms = [pooled_rms(before), pooled_rms(after), pooled_steady_rms(after)]
+    first, last, steady = (significant(error * shown.error_factor) for error in rms)
+    # of the same recordings, as in the table
+    noise = pooled_noise(after) or outcome.noise
+    floor = f"the noise floor of {significant(noise * shown.error_factor)} {shown.error_unit}"
+    times = f"{significant(rms[1] / noise)} times {floor}"
+    if not changed:
+        said = f"On {role} the error is {last} {shown.error_unit} RMS, {times}."
+    elif first == last:
+        said = f"On {role} the error stays {last} {shown.error_unit} RMS, which is {times}."
+    else:
+        verb = "falls" if rms[1] < rms[0] else "rises"
+        said = (
+            f"On {role} the error {verb} from {first} to {last} {shown.error_unit} RMS, which is "
+            f"{times}."
+        )
+    if steady == last:
+        return said
+    return (
+        f"{said} Without slow noise, drift and events of each recording it is "
+        f"{steady} {shown.error_unit} RMS, {significant(rms[2] / noise)} times the noise."
+    )
+
+
+def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
+    """Yield a sentence on each recording in which something happened once."""
+    shown = SHOWN[outcome.kind]
+    for c in (*outcome.after.train, *outcome.after.validation):
+        if not c.events:
+            continue
+        what = listed(
+            f"a {e.kind} of {significant(e.size)}{f' {e.unit}' if e.unit else ''} at {e.time:.2f} s"
+            for e in c.events
+        )
+        left = ""
+        if c.rms_without_events is not None:
+            left = (
+                f" Without what is its own, the error is "
+                f"{significant(c.rms_without_events * shown.error_factor)} {shown.error_unit} RMS."
+            )
+        yield f"In {c.name} there is {what}: other recordings are predicted without it.{left}"
+
+
+def _rivals_sentence(step: Step) -> str:
+    return (
+        f"These data cannot separate {step.effect} from "
+        f"{listed(family_label(f) for f in step.indistinguishable_from)}: each explains them "
+        f"equally well."
+    )
+
+
+def _unnamed(outcome: DiagnoseOutcome) -> str:
+    unnamed = outcome.finding.unnamed
+    if unnamed is None:
+        return ""
+    formula = f"; as a formula: {unnamed.expression}" if unnamed.expression else ""
+    return _sentence(f"The part that no known family covers acts on the {unnamed.acts_on}{formula}")
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith((".", "!", "?")) else f"{text}."
+
+
+def warnings(outcome: DiagnoseOutcome) -> tuple[str, ...]:
+    """Return the warnings about recordings and search, without duplicates."""
+    said = [outcome.assumed] if outcome.assumed else []
+    said += [*outcome.quality, *(w[:1].upper() + w[1:] for w in outcome.finding.notes)]
+    for comparison in (*outcome.after.train, *outcome.after.validation):
+        said += [f"{comparison.name}: {w}" for w in comparison.warnings]
+    return tuple(dict.fromkeys(readable(_sentence(w)) for w in said))
+
+
+# tables
+
+
+def _pairs(
+    before: Sequence[Comparison], after: Sequence[Comparison]
+) -> list[tuple[str, Errors, Errors, float | None]]:
+    """Return (name, errors before, errors after, noise) of every recording and of all pooled."""
+    first = {c.name: c for c in before}
+    rows = [
+        (c.marked_name, first[c.name].errors, c.errors, c.noise) for c in after if c.name in first
+    ]
+    if len(rows) > 1:
+        one, two = pooled_errors(before), pooled_errors(after)
+        noise = pooled_noise([c for c in after if c.name in first])
+        if one is not None and two is not None:
+            rows.append(("all", one, two, noise))
+    return rows
+
+
+def before_after_table(
+    title: str, before: Sequence[Comparison], after: Sequence[Comparison], kind: str
+) -> Table:
+    """Return RMS, NRMSE and RMS over noise of every recording, before and after."""
+    shown, film = SHOWN[kind], kind == "film"
+    rows = []
+    for name, one, two, noise in _pairs(before, after):
+        both = (one, two)
+        cells = [
+            name,
+            *(significant(e.rms * shown.error_factor) for e in both),
+            *(significant(e.peak_pct if film else e.nrmse_pct) for e in both),
+            *(significant(e.rms / noise) if noise else NO_VALUE for e in both),
+        ]
+        rows.append(Row(tuple(cells), mark=name == "all"))
+    relative = "RMS %" if film else "NRMSE %"
+    head = (
+        ("", ""),
+        (f"RMS {shown.error_unit}", "before"), ("", "after"),
+        (relative, "before"), ("", "after"),
+        ("RMS / noise", "before"), ("", "after"),
+    )  # fmt: skip
+    return Table(title, head, tuple(rows))
+
+
+def thesis_before_after_table(
+    title: str, before: Sequence[Comparison], after: Sequence[Comparison], kind: str
+) -> Table:
+    """Return the thesis's measures and the largest error of every recording, before and after."""
+    shown, film = SHOWN[kind], kind == "film"
+    rows = []
+    for name, one, two, _ in _pairs(before, after):
+        cells = [name]
+        if not film:
+            cells += [significant(e.e_rms_thesis_pct) for e in (one, two)]
+        cells += [significant(e.e_m_thesis_pct) for e in (one, two)]
+        cells += [significant(e.max * shown.error_factor) for e in (one, two)]
+        rows.append(Row(tuple(cells), mark=name == "all"))
+    head = [("", "")]
+    if not film:
+        head += [("e_rms %", "before"), ("", "after")]
+    head += [("e_m %", "before"), ("", "after")]
+    head += [(f"Max {shown.error_unit}", "before"), ("", "after")]
+    return Table(title, tuple(head), tuple(rows))
+
+
+def step_table(outcome: DiagnoseOutcome) -> Table:
+    """Return the errors of the model after each step: training, selection and validation."""
+    shown, finding = SHOWN[outcome.kind], outcome.finding
+    stages = [finding.baseline, *(s.stage for s in finding.steps)]
+    names = ["thesis model", *(f"+ {s.effect}" for s in finding.steps)]
+    rows = []
+    for i, (name, stage) in enumerate(zip(names, stages, strict=True)):
+        stand = outcome.stands[i] if i < len(stages) - 1 else outcome.after
+        if i == 0:
+            stand = outcome.before
+        errors = pooled_errors(stand.validation)
+        noise = pooled_noise(stand.validation) or outcome.noise
+        rows.append(
+            Row(
+                (
+                    name,
+                    significant(stage.train_rms * shown.error_factor),
+                    significant(stage.selection_rms * shown.error_factor),
+                    NO_VALUE if errors is None else significant(errors.rms * shown.error_factor),
+                    NO_VALUE if errors is None else significant(errors.rms / noise),
+                ),
+                mark=i == len(stages) - 1 and i > 0,
+            )
+        )
+    head = (
+        ("Model", ""), ("Training", shown.error_unit), ("Selection", shown.error_unit),
+        ("Validation", shown.error_unit), ("Validation", "/ noise"),
+    )  # fmt: skip
+    note = (
+        "RMS errors. Training: recordings that were fitted. Selection: time segments of the "
+        "training recordings, each predicted by a fit to the others. Validation: other "
+        "recordings, compared once at the end."
+    )
+    return Table("Step by step", head, tuple(rows), note)
+
+
+_VERDICTS = {
+    "chosen": "chosen",
+    "indistinguishable": "not separable",
+    "better": "explains less",
+    "worthless": "no better than chance",
+    "failed": "fit failed",
+}
+
+
+def ranking_table(found: Round, kept: Collection[str], longest: int | None = None) -> Table:
+    """Return the candidates of one round, best first; ``kept`` are the effects of the final model.
+
+    A candidate that was chosen and later replaced is not marked as chosen. With ``longest`` the
+    table has at most so many rows, and fewer columns for a terminal.
+    """
+    brief = longest is not None
+    base = f"on top of {listed(found.base)}" if found.base else "on top of the thesis model"
+    rows = []
+    for c in found.candidates[:longest]:
+        cells = [c.effect]
+        if not brief:
+            cells.append(family_label(c.family))
+        cells.append(_share(c.gained))
+        if not brief:
+            cells += [_share(c.promised), significant(c.gain, 3)]
+        chosen = c.verdict == "chosen" and c.effect in kept
+        verdict = "replaced later" if c.verdict == "chosen" and not chosen else c.verdict
+        cells += [significant(c.behind, 3), _VERDICTS.get(verdict, verdict)]
+        idle = c.verdict in ("worthless", "failed")
+        rows.append(Row(tuple(cells), c.note, idle, chosen))
+    head = [("Effect", ""), ("Explains", "%"), ("Behind", "best"), ("Verdict", "")]
+    if not brief:
+        head[1:1] = [("Family", "")]
+        head[3:3] = [("Predicted", "%"), ("Gain", "")]
+    rest = len(found.candidates) - len(rows)
+    note = _sentence(found.reason[:1].upper() + found.reason[1:]) if found.reason else ""
+    if rest:
+        note = f"{note} {rest} more candidates are worse."
+    return Table(f"Candidates {base}", tuple(head), tuple(rows), note.strip())
+
+
+def _share(of_one: float) -> str:
+    """Return a share in percent, with one decimal."""
+    return f"{100.0 * max(of_one, 0.0):.1f}"
+
+
+def rankings(outcome: DiagnoseOutcome, longest: int | None = None) -> tuple[Table, ...]:
+    """Return the table of each round, see ``ranking_table``."""
+    kept = {s.effect for s in outcome.finding.steps}
+    return tuple(ranking_table(found, kept, longest) for found in outcome.finding.rounds)
+
+
+def dropped_effects(outcome: DiagnoseOutcome) -> str:
+    """Return a sentence on effects that were chosen and later removed; empty without any."""
+    finding = outcome.finding
+    kept = {s.effect for s in finding.steps}
+    gone = dict.fromkeys(r.chosen for r in finding.rounds if r.chosen and r.chosen not in kept)
+    if not gone or not kept:
+        return ""
+    was = "was the best single effect but is" if len(gone) == 1 else "were chosen first but are"
+    it = "it adds" if len(gone) == 1 else "they add"
+    return (
+        f"{listed(gone)} {was} not in the final model: {listed(kept)} together explain more, and "
+        f"{it} nothing to them."
+    )
+
+
+def effect_table(outcome: DiagnoseOutcome) -> Table:
+    """Return the parameters of the effects found, with intervals and meaning."""
+    from dearig.model.effects import EFFECTS
+
+    rows = []
+    for step in outcome.finding.steps:
+        meanings = {p.name: p.meaning for p in EFFECTS[step.effect].parameters}
+        for e in step.estimates:
+            about = meanings.get(e.name.split(" in ")[0], "")  # may be a parameter of one recording
+            detail = "; ".join(w for w in (about, e.note) if w)
+            rows.append(_estimate(e, f"{step.effect}: {e.name.replace('_', ' ')}", detail))
+    return Table("Fitted parameters", _ESTIMATES, tuple(rows))
+
+
+def estimate_table(estimates: Sequence[Estimate]) -> Table:
+    """Return all parameters of a model."""
+    rows = tuple(_estimate(e, symbol(e.name).replace("_", " "), e.note) for e in estimates)
+    note = ""
+    if any(not e.determined for e in estimates):
+        note = "Values in brackets are not determined by these data."
+    return Table("Parameters", _ESTIMATES, rows, note)
+
+
+_ESTIMATES = (("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", ""))
+
+
+def _estimate(e: Estimate, name: str, detail: str) -> Row:
+    factor, unit = parameter_unit(e.unit)
+    low, high = e.low * factor, e.high * factor
+    value = quoted(e.value * factor, low, high)
+    within = interval(low, high) if e.free else "derived"
+    if e.free and e.low == e.high == e.value:
+        within = NO_VALUE
+    if e.at_bound:
+        within += BOUND_MARK
+    return Row(
+        (name, value if e.determined else f"({value})", unit, within),
+        detail,
+        muted=not e.determined,
+    )
+
+
+def experiment_table(outcome: DiagnoseOutcome) -> Table | None:
+    """Return the excitations that were considered, the best first; None without any."""
+    experiment = outcome.experiment
+    if experiment is None:
+        return None
+    rows = tuple(
+        Row((name, significant(apart), seconds(duration)), mark=name == experiment.name)
+        for name, apart, duration in experiment.tried
+    )
+    head = (("Excitation", ""), ("Separation", "/ noise"), ("Duration", ""))
+    note = (
+        "Separation: RMS difference between the predictions of the two most similar rivals, "
+        "divided by the noise floor."
+    )
+    return Table("Excitations considered", head, rows, note)

@@ -1,0 +1,1 @@
+"""Editing of text files: editor, dialogs, questions before text is lost."""

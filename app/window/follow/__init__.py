@@ -1,0 +1,1 @@
+"""The page Follow: tracking of a path, and holding of a displacement."""

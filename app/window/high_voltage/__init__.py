@@ -1,0 +1,1 @@
+"""The state of the high voltage: status, bar, alarms, keys that stop a run."""

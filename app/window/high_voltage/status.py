@@ -1,0 +1,285 @@
+"""High voltage of the window's rig: its state, the last readings, and the alarm that is latched.
+
+There is one ``HighVoltageStatus``; the bar of the main window and the Run page both show it.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer, Signal, Slot
+
+from dearig.acquisition.rigs import is_simulated
+from dearig.output_state import Known, OutputState
+from dearig.window.high_voltage.state import HighVoltage, kilovolts, state_at_rest
+from dearig.window.session.settings import kept_text
+from dearig.window.session.state import Session
+
+__all__ = ["ARMED_FOR", "HighVoltageStatus", "LatchedAlarm", "Reading", "recording_of"]
+
+log = logging.getLogger(__name__)
+
+ARMED_FOR = 30.0  #: s after which a rig that was armed and not started is disarmed
+_TICK = 250  # ms between two updates of the countdown
+_KEY = "alarm"  # of the settings; with the address of the rig
+_BLOCK = "alarm"  # of the session
+
+
+@dataclass(frozen=True)
+class LatchedAlarm:
+    """What ended a run at ``at`` s since 1970, on the rig ``address``; latched until acknowledged.
+
+    ``recording`` is the path of the run's recording, empty where there is none. ``known`` says how
+    the output was known then.
+    """
+
+    headline: str
+    sentence: str
+    at: float
+    address: str
+    recording: str = ""
+    known: str = Known.UNKNOWN.value
+
+    @property
+    def text(self) -> str:
+        """The alarm in one sentence, with its time of day."""
+        return f"{self.headline} at {_clock(self.at)}: {self.sentence}"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Voltage monitor in V, and the time ``seconds`` of ``total`` s in the sequence."""
+
+    monitor: float
+    seconds: float
+    total: float
+
+
+class HighVoltageStatus(QObject):
+    """What is known of the high voltage; ``changed`` comes with everything that is shown.
+
+    ``output`` is what was measured after the last run on the rig of the session, None where this
+    program has not contacted that rig. A latched ``alarm`` blocks arming. It is kept in the
+    settings for a rig that is not simulated, so that another start of the program shows it again.
+    ``disarm_due`` comes when the time to start an armed rig is over.
+    """
+
+    changed = Signal()
+    state_changed = Signal(object)
+    disarm_due = Signal()
+    acknowledged = Signal(str)  #: name of the person
+
+    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        # armed, on, ramping, or between two runs of a campaign; None at rest
+        self._phase: HighVoltage | None = None
+        self._next = ""  # what a campaign does next
+        self._output: OutputState | None = None
+        self._address = session.address  # of the rig that ``output`` belongs to
+        self._told = False  # during a run: the output at its end is known
+        self._state = HighVoltage.NOT_CONTACTED
+        self._deadline = 0.0
+        self._ticks = QTimer(self, interval=_TICK)
+        self._ticks.timeout.connect(self._tick)
+        self.reading: Reading | None = None
+        self.alarm: LatchedAlarm | None = None
+        session.rig_changed.connect(self._rig_changed)
+        self._restore()
+
+    @property
+    def state(self) -> HighVoltage:
+        """Voltage that may be on the electrodes."""
+        return self._state
+
+    @property
+    def output(self) -> OutputState | None:
+        """What was measured after the last run; None for a rig that was not contacted."""
+        return self._output if self._address == self._session.address else None
+
+    @property
+    def running(self) -> bool:
+        """True while the voltage may be up, or on its way down."""
+        return self._phase in (HighVoltage.ON, HighVoltage.RAMPING)
+
+    @property
+    def live(self) -> bool:
+        """True while ``reading`` is that of this moment."""
+        return self.running and not self._told
+
+    @property
+    def seconds_to_start(self) -> int:
+        """Whole s until the rig is disarmed."""
+        return max(0, int(self._deadline - _now() + 0.999))
+
+    @property
+    def words(self) -> str:
+        """Sentence on the state: the countdown, or what was measured and when."""
+        words = ""
+        if self._state is HighVoltage.ARMED:
+            words = f"no voltage yet; disarms in {self.seconds_to_start} s"
+        elif not self.live:
+            output = self.output
+            words = "the voltage was not read yet" if output is None else output.sentence
+            if self._state is HighVoltage.BETWEEN:
+                words = f"{words}; {self._next}"
+        simulated = is_simulated(self._session.address)
+        return " · ".join(part for part in (words, "simulated" if simulated else "") if part)
+
+    @property
+    def detail(self) -> str:
+        """The same, with the voltage during a run."""
+        if self.live and self.reading is not None:
+            return f"{kilovolts(self.reading.monitor)}  {self.words}".rstrip()
+        return self.words
+
+    # what the runner reports
+
+    def set_phase(self, phase: HighVoltage | None) -> None:
+        """Set ARMED, ON, RAMPING, or None for rest."""
+        if phase is HighVoltage.ARMED:
+            self._deadline = _now() + ARMED_FOR
+            self._ticks.start()
+        else:
+            self._ticks.stop()
+        if phase is HighVoltage.ON:
+            self.reading, self._told = None, False
+        self._phase = phase
+        self._refresh()
+
+    def set_between(self, words: str) -> None:
+        """Set that a campaign is between two runs; ``words`` say what it does next."""
+        self._next = words
+        self.set_phase(HighVoltage.BETWEEN)
+
+    def set_output(self, output: OutputState) -> None:
+        """Set what was measured of the output at the end of a run, also before the run's end."""
+        self._output, self._address, self._told = output, self._session.address, True
+        self._refresh()
+
+    def show_reading(self, reading: Reading) -> None:
+        """Show the newest samples of a run."""
+        if reading != self.reading:
+            self.reading = reading
+            self.changed.emit()
+
+    def run_begins(self) -> None:
+        """Keep a note of the run, for a start of the program after this one has died in it."""
+        self._keep(
+            LatchedAlarm(
+                # shown with the time that follows it, which is that of the start
+                "The program ended during what was started",
+                "what is on the output is unknown: switch the amplifier off, and read the log",
+                time.time(),
+                self._session.address,
+            )
+        )
+
+    def run_ended(self, alarm: LatchedAlarm | None) -> None:
+        """Latch ``alarm``; None for a run that ended as it should."""
+        self._keep(alarm)
+        self._latch(alarm)
+
+    def acknowledge(self, name: str) -> LatchedAlarm | None:
+        """Release the latch in the ``name`` of a person; return the alarm that was latched."""
+        alarm = self.alarm
+        if alarm is None or not name.strip():
+            return None
+        log.warning("%s acknowledged the alarm: %s", name.strip(), alarm.text)
+        self._keep(None)
+        self._latch(None)
+        self.acknowledged.emit(name.strip())
+        return alarm
+
+    def _latch(self, alarm: LatchedAlarm | None) -> None:
+        self.alarm = alarm
+        if alarm is None:
+            self._session.unblock(_BLOCK)
+        else:
+            self._session.block(
+                _BLOCK,
+                f"{alarm.headline} at {_clock(alarm.at)}: look at the rig, then acknowledge the "
+                f"alarm in the bar at the top",
+            )
+        self._refresh()
+
+    def _refresh(self) -> None:
+        state = self._shown()
+        if state is not self._state:
+            self._state = state
+            self._session.set_armed(state is HighVoltage.ARMED)
+            self.state_changed.emit(state)
+        self.changed.emit()
+
+    def _shown(self) -> HighVoltage:
+        if self._phase is HighVoltage.ARMED or self.live:
+            return self._phase or HighVoltage.UNKNOWN
+        output = self.output
+        if self._phase is HighVoltage.BETWEEN and (output is None or output.confirmed):
+            return HighVoltage.BETWEEN
+        if output is not None:
+            return state_at_rest(output.known)
+        return HighVoltage.NOT_CONTACTED
+
+    @Slot()
+    def _tick(self) -> None:
+        if _now() >= self._deadline:
+            self.disarm_due.emit()
+        else:
+            self.changed.emit()
+
+    @Slot()
+    def _rig_changed(self) -> None:
+        if not self.running:
+            self.reading = None if self.output is None else self.reading
+            if self.alarm is None:
+                self._restore()
+            self._refresh()
+
+    # the settings
+
+    def _keep(self, alarm: LatchedAlarm | None) -> None:
+        address = self._session.address if self.alarm is None else self.alarm.address
+        if is_simulated(address):
+            return
+        key = f"{_KEY}/{address}"
+        if alarm is None:
+            self._session.settings.remove(key)
+        else:
+            self._session.settings.setValue(key, json.dumps(asdict(alarm)))
+            self._session.settings.sync()  # the program may die in the next moment
+
+    def _restore(self) -> None:
+        """Latch what an earlier start of the program has left for this rig."""
+        address = self._session.address
+        kept = kept_text(self._session.settings, f"{_KEY}/{address}")
+        if not kept or is_simulated(address):
+            return
+        try:
+            alarm = LatchedAlarm(**json.loads(kept))
+        except (TypeError, ValueError):
+            log.warning("the alarm that is kept in the settings cannot be read: %r", kept)
+            alarm = LatchedAlarm(
+                "An alarm of an earlier run", "it cannot be read any more", time.time(), address
+            )
+        if alarm.known != Known.CONFIRMED.value:
+            self._output, self._address = OutputState(Known.UNKNOWN, alarm.at), address
+        self._latch(alarm)
+
+
+def _now() -> float:
+    return time.monotonic()
+
+
+def _clock(at: float) -> str:
+    return time.strftime("%H:%M:%S", time.localtime(at))
+
+
+def recording_of(alarm: LatchedAlarm) -> Path | None:
+    """Return the recording of the run that ``alarm`` ended, where there is one."""
+    path = Path(alarm.recording)
+    return path if alarm.recording and path.is_file() else None

@@ -1,0 +1,1 @@
+"""Import of measured data in the window."""

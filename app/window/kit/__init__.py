@@ -1,0 +1,1 @@
+"""Building blocks of the window: theme, widgets, forms and fields."""

@@ -1,0 +1,57 @@
+"""Scrollable page of sentences and report tables."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QScrollArea, QVBoxLayout, QWidget
+
+from dearig.report.text.tables import Table
+from dearig.window.kit.report_table import ReportTable
+from dearig.window.kit.theme import SPACE
+from dearig.window.kit.widgets import label
+
+__all__ = ["ReportPage"]
+
+
+class ReportPage(QScrollArea):
+    """Scrollable sentences and tables."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setWidgetResizable(True)
+        self.setFrameShape(QScrollArea.Shape.NoFrame)
+        self.show_pieces(())
+
+    def show_pieces(
+        self, pieces: list[str | Table] | tuple[str, ...], warnings: tuple[str, ...] = ()
+    ) -> None:
+        """Replace the contents."""
+        inner = QWidget()
+        column = QVBoxLayout(inner)
+        column.setSpacing(SPACE)
+        widest = 0
+        for piece in pieces:
+            if isinstance(piece, str):
+                column.addWidget(_paragraph(piece, ""))
+                continue
+            column.addWidget(label(piece.title, "heading"))
+            if piece.rows:
+                table = ReportTable(whole=True)
+                table.show_table(piece)
+                column.addWidget(table)
+                widest = max(widest, table.maximumWidth())
+            if piece.note:
+                column.addWidget(_paragraph(piece.note, "muted"))
+        for warning in warnings:
+            column.addWidget(_paragraph(f"! {warning}", "warn"))
+        column.addStretch(1)
+        # the page scrolls sideways and not the table
+        inner.setMinimumWidth(widest)
+        self.setWidget(inner)
+
+
+def _paragraph(text: str, role: str) -> QLabel:
+    made = label(text, role)
+    made.setWordWrap(True)
+    made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    return made

@@ -1,0 +1,155 @@
+"""Plot of one or several recordings over time: drive, measurement and model, residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Slot
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from dearig.analysis.summary import Curves
+from dearig.recording.reading.marks import marks_in
+from dearig.units import SHOWN
+from dearig.window.kit.theme import pen
+from dearig.window.kit.widgets import plain_tip
+from dearig.window.plots.area import PlotArea
+from dearig.window.plots.limit_lines import MarkLine, PlotOverlay
+from dearig.window.plots.plot import Entry
+from dearig.window.run.channel_plots import ChannelPlots
+from dearig.window.session.state import Session
+
+__all__ = ["CurvesPlot"]
+
+
+class CurvesPlot(QWidget):
+    """Three plots on one time axis, and below them the declared channels of a single recording.
+
+    The model is dashed where several recordings share a plot.
+    """
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._shown: tuple[Curves, ...] = ()
+        self._with_model = True
+        self._with_current = False
+        self.area = PlotArea(session, "Curves of the selected recordings")
+        # the measurement gets the most space
+        self.plots = [
+            self.area.add_plot(row, left=label, weight=weight)
+            for row, (label, weight) in enumerate(
+                (
+                    ("Voltage (kV)", 3),
+                    ("Displacement (mm)", 5),
+                    ("Residual (µm)", 4),
+                    ("Current (mA)", 3),
+                )
+            )
+        ]
+        self.marks = PlotOverlay(self.plots[1], 1.0, session.theme)
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(0, 0, 0, 0)
+        outer.addWidget(self.area, 1)
+        self.channels = ChannelPlots(session, self.area, len(self.plots))
+        session.theme_changed.connect(self._draw)
+        self._draw()
+
+    @property
+    def shown(self) -> tuple[Curves, ...]:
+        """Recordings that are drawn."""
+        return self._shown
+
+    def show_curves(self, curves: Sequence[Curves]) -> None:
+        """Draw ``curves``, all of one kind, over their whole time."""
+        self._shown = tuple(curves)
+        self._draw()
+        self.area.file_stem = self._shown[0].name if len(self._shown) == 1 else "recordings"
+        self.area.auto_range()
+
+    @Slot(bool)
+    def show_model(self, shown: bool) -> None:
+        """Show or hide the model and the residual."""
+        self._with_model = shown
+        self._draw()
+
+    @Slot(bool)
+    def show_current(self, shown: bool) -> None:
+        """Show or hide the monitored current."""
+        self._with_current = shown
+        self._draw()
+
+    @Slot()
+    def _draw(self) -> None:
+        theme = self._session.theme
+        self.marks.set_theme(theme)
+        self.marks.show_marks((), with_words=True)
+        for plot in self.plots:
+            plot.clear_all()
+        drive, both, residual, current = self.plots
+        shown = SHOWN[self._shown[0].kind if self._shown else "actuator"]
+        drive.set_axis("left", shown.drive_label)
+        both.set_axis("left", shown.label)
+        residual.set_axis("left", f"Residual ({shown.error_unit})")
+        self.area.show_plot(residual, self._with_model)
+        self.area.show_plot(current, self._with_current)
+        declared = self._shown[0].declared if len(self._shown) == 1 else ()
+        self.channels.show_channels([(name, unit) for name, unit, _ in declared])
+        for place, (_, _, values) in enumerate(declared):
+            self.channels.show_values(place, *values)
+        if not self._shown:
+            return
+        alone = len(self._shown) == 1
+        zero = pg.InfiniteLine(0.0, angle=0, pen=pen(theme.muted, dashed=True))
+        residual.addItem(zero, ignoreBounds=True)
+        for i, curves in enumerate(self._shown):
+            colour = theme.measured if alone else theme.curves[i % len(theme.curves)]
+            name = "measured" if alone else curves.name
+            # several recordings are named once: their keys would take the height of the plots
+            drive.add_curve(
+                "commanded" if alone else name, theme.command if alone else colour, in_key=alone
+            ).set_points(curves.drive[0], curves.drive[1] * shown.drive_factor)
+            if curves.current is not None:
+                time, amperes = curves.current
+                current.add_curve(
+                    "monitored current" if alone else name,
+                    theme.monitor if alone else colour,
+                    in_key=alone,
+                ).set_points(time, amperes * 1e3)
+            time, measured = curves.measured
+            both.add_curve(name, colour).set_points(time, measured * shown.factor)
+            if not self._with_model or curves.model is None or curves.residual is None:
+                continue
+            beside = theme.models[0] if alone else colour
+            time, model = curves.model
+            both.add_curve(
+                "model" if alone else f"model of {name}", beside, dashed=not alone, in_key=alone
+            ).set_points(time, model * shown.factor)
+            time, left = curves.residual
+            residual.add_curve("residual" if alone else name, beside, in_key=alone).set_points(
+                time, left * shown.error_factor
+            )
+        if alone:
+            monitor = self._shown[0].monitor
+            if monitor is not None:
+                drive.add_curve("monitor", theme.monitor).set_points(
+                    monitor[0], monitor[1] * shown.drive_factor
+                )
+            self._events(self._shown[0])
+        elif self._with_model and any(c.model is not None for c in self._shown):
+            both.add_entry(Entry("model of each recording", theme.muted, dashed=True))
+
+    def _events(self, curves: Curves) -> None:
+        theme = self._session.theme
+        self.marks.show_marks(
+            tuple(MarkLine(m.time, m.words, theme.text) for m in marks_in(curves.events)),
+            with_words=True,
+        )
+        for event in curves.events:
+            if event.level == "info":
+                continue
+            colour = theme.bad if event.level == "fault" else theme.warn
+            line = pg.InfiniteLine(event.time, angle=90, pen=pen(colour, dashed=True))
+            line.setToolTip(plain_tip(f"{event.time:.4g} s, {event.level}: {event.message}"))
+            line.setCursor(Qt.CursorShape.WhatsThisCursor)
+            self.plots[1].addItem(line, ignoreBounds=True)

@@ -1,0 +1,512 @@
+"""Page Rig: choice of the rig, check of its instruments, and its rig file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QSignalBlocker, Qt, Slot
+from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeySequence, QShowEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QButtonGroup,
+    QGridLayout,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QRadioButton,
+    QScrollArea,
+    QSpinBox,
+    QTableWidget,
+    QTableWidgetItem,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dearig.acquisition.check import CheckOutcome, check_rig
+from dearig.acquisition.rigs import is_simulated
+from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values
+from dearig.config.toml_edit import with_key
+from dearig.config.toml_input import read_text
+from dearig.drivers.daqmx.address import Address
+from dearig.drivers.errors import AddressError
+from dearig.errors import InputError
+from dearig.units import readable
+from dearig.window.documents.dialogs import choose_file, save_as
+from dearig.window.documents.questions import may_drop, replace_or_tell
+from dearig.window.jobs.background import Background
+from dearig.window.kit.fields import form_fields, in_words
+from dearig.window.kit.form import Form
+from dearig.window.kit.theme import SPACE
+from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
+from dearig.window.session.state import Session
+from dearig.window.session.text_file import Asked, Saved, TextFile
+
+__all__ = ["RigPage"]
+
+_SHAPES = {"ok": "●", "warning": "▲", "wrong": "✗", "not wired": "○"}
+_WORDS = {"ok": "OK", "warning": "Check", "wrong": "Wrong", "not wired": "Not wired"}
+_BLOCK, _ADDRESS_BLOCK = "rig file", "rig address"  # keys of what blocks arming
+_KINDS = ("sim", "hidden", "local", "remote")
+
+
+class RigPage(QWidget):
+    """Chooses and checks the rig, and edits the rig file with faults beside their fields."""
+
+    title = "Rig"
+    shortcut = "Ctrl+1"
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.text = session.rig_text
+        self._in_force = session.rig_text  # the last text without faults
+        self._typing = False  # a name or server is typed, and not taken
+        self.forms: dict[str, Form] = {}  # made when their tab is first shown
+        self._areas: dict[str, QScrollArea] = {}
+        self.file = TextFile("rig file", session.rig_text, session.rig_path)
+        self._checks = Background(self)
+        self._checks.done.connect(self._checked)
+        self._checks.failed.connect(lambda words: self.summary.show_text(words))
+        self._checks.busy_changed.connect(self._checking)
+        self._files = Background(self)
+        self._files.done.connect(self._file_done)
+        self._files.failed.connect(lambda words: self.trouble.show_text(words))
+        self.outcome: CheckOutcome | None = None
+        self.setAcceptDrops(True)
+        self._build()
+        session.rig_changed.connect(self._rig_changed)
+        session.theme_changed.connect(self._show_outcome)
+        session.running_changed.connect(self._running_changed)
+        self._show_address()
+        self._show_outcome()
+        self._show_all()
+
+    # choice and check of the rig
+
+    @Slot()
+    def choose(self) -> None:
+        """Use the rig of the fields."""
+        kind = _KINDS[self.kinds.checkedId()]
+        device = self.device.text().strip()
+        address = {
+            "sim": "sim",
+            "hidden": f"sim:{self.seed.value()}",
+            "local": f"daqmx:{device}",
+            "remote": f"daqmx:{device}@{self.server.text().strip()}",
+        }[kind]
+        self._typing = False
+        self.seed.setEnabled(kind == "hidden")
+        self.device.setEnabled(kind in ("local", "remote"))
+        self.server.setEnabled(kind == "remote")
+        self.session.set_address(address)
+        self._block_address()
+
+    @Slot()
+    def _address_typed(self) -> None:
+        """Block arming until the typed name or server is taken: with Enter, or on leaving it."""
+        self._typing = True
+        self._block_address()
+
+    def _block_address(self) -> None:
+        fault, address = "", self.session.address
+        if address.startswith("daqmx:"):
+            try:
+                Address.parse(address)
+            except AddressError as error:
+                fault = str(error)
+        if self._typing:
+            fault = "the name of the card or its server is typed, but not taken: press Enter"
+        for field in (self.device, self.server):
+            set_wrong(field, bool(fault) and field.isEnabled())
+        self.address_fault.show_text(fault, "warn" if self._typing else "bad")
+        if fault:
+            self.session.block(_ADDRESS_BLOCK, f"rig: {fault}", self.title)
+        else:
+            self.session.unblock(_ADDRESS_BLOCK)
+
+    @Slot()
+    def check(self) -> None:
+        """Check the instruments; the output stays at 0 V."""
+        address, rig_file = self.session.address, self.session.rig_file
+        self._checks.start(lambda: check_rig(address, rig_file))
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Check a simulated rig when the page is shown; a real one waits for the button."""
+        super().showEvent(event)
+        if self.outcome is None and not self._checks.busy and is_simulated(self.session.address):
+            self.check()
+
+    @Slot(object)
+    def _checked(self, outcome: CheckOutcome) -> None:
+        self.outcome = outcome if outcome.rig == self.session.address else None
+        self._show_outcome()
+
+    @Slot(bool)
+    def _checking(self, busy: bool) -> None:
+        self.check_button.setEnabled(not busy and not self.session.running)
+        if busy:
+            self.summary.show_text(f"Checking {self.session.address} …", "muted")
+
+    @Slot(bool)
+    def _running_changed(self, running: bool) -> None:
+        for part in (self.address_card, self.editor):
+            part.setEnabled(not running)
+        self.check_button.setEnabled(not running and not self._checks.busy)
+
+    @Slot()
+    def _rig_changed(self) -> None:
+        self.outcome = None
+        self._show_outcome()
+        self._show_address()
+        session = self.session
+        if session.rig_text not in (self.text, self._in_force):  # another page opened another file
+            self.text = self._in_force = session.rig_text
+            self.file = TextFile("rig file", self.text, session.rig_path)
+            session.recovery.note(self.file, self.text)
+            self._show_all()
+
+    # the rig file
+
+    def open_file(self, path: Path) -> None:
+        """Read a rig file."""
+        if may_drop(self, self.session, self.file, self.text):
+            self._files.start(lambda: (path, read_text(path, "rig file")))
+
+    @Slot()
+    def save(self) -> None:
+        """Write the rig file to its file, or ask for one."""
+        if self.file.path is None:
+            self._ask_save()
+        else:
+            self.save_file(self.file.path)
+
+    def save_file(self, path: Path, replace: bool = False) -> None:
+        """Write the rig file to ``path``; an existing file is replaced as a whole.
+
+        Asks where another program has changed the file since it was opened, unless ``replace``.
+        """
+        file, text = self.file, self.text
+        self._files.start(lambda: file.write(path, text, replace))
+
+    def set_value(self, table: str, key: str, value: Any) -> None:
+        """Change one key; a rig file with faults shows them, is not used, and blocks arming."""
+        self._take(with_key(self.text, table, key, value), self.file)
+
+    def restore(self, text: str, file: TextFile) -> None:
+        """Replace the rig file by the unsaved one of an earlier window."""
+        self._take(text, file)
+        self._show_all()
+
+    def close_work(self) -> None:
+        """Wait for the threads."""
+        self._checks.close()
+        self._files.close()
+
+    @Slot(object)
+    def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
+        self.trouble.show_text("")
+        if isinstance(answer, Asked):
+            replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
+        elif isinstance(answer, Saved):
+            answer.file.note(answer)
+            self._take(self.text, self.file)  # the path may be another one
+            self._show_all()
+            self.session.message.emit(f"Saved {answer.path}")
+        else:
+            path, text = answer
+            self._take(text, TextFile("rig file", text, path))
+            self._show_all()
+
+    def _take(self, text: str, file: TextFile) -> None:
+        try:
+            faults = faults_of(text)
+        except InputError as error:
+            self.trouble.show_text(f"{error}. The previous rig file stays in use.")
+            return
+        self.text, self.file = text, file
+        if not faults:
+            self._in_force = text
+            folder = None if file.path is None else file.path.resolve().parent
+            self.session.set_rig_file(file.path, text, parse_rig_file(text, folder))
+        self.session.recovery.note(file, text)
+        self._show_faults(faults)
+
+    def _show_all(self) -> None:
+        for table, form in self.forms.items():
+            form.show_values(section_values(self.text, table))
+        self._show_faults(faults_of(self.text))
+
+    def _show_faults(self, faults: dict[tuple[str, str], str]) -> None:
+        faults = {place: in_words(words) for place, words in faults.items()}
+        said = set()
+        for i, table in enumerate(SECTIONS):
+            keys = {k: words for (t, k), words in faults.items() if t == table}
+            if table in self.forms:
+                self.forms[table].show_faults(keys)
+            said |= {(table, k) for k in keys if k in SECTIONS[table].model_fields}
+            mark = "✗ " if keys else ""
+            self.tabs.setTabText(i, f"{mark}{table}")
+        rest = [words for place, words in faults.items() if place not in said]
+        errors = f"{len(faults)} error{'s' if len(faults) > 1 else ''}"
+        head = ""
+        if faults:
+            head = f"Fix {errors}; until then nothing can be armed. {self._limits_in_force()}"
+        self.state.show_text("\n".join([head, *rest]).strip(), "bad")
+        self.file_name.setText(self.file.name(self.text))
+        self.file_name.setToolTip(self.file.tip)
+        self.save_button.setEnabled(not faults)
+        self.save_as_button.setEnabled(not faults)
+        self._block_arming(faults)
+
+    def _limits_in_force(self) -> str:
+        limits = self.session.rig_file.limits
+        return (
+            f"The previous limits are in force: {limits.voltage_min_kV:g} to "
+            f"{limits.voltage_max_kV:g} kV"
+        )
+
+    def _block_arming(self, faults: dict[tuple[str, str], str]) -> None:
+        """Block arming while the rig file has faults: a limit typed beside them is not in force."""
+        if not faults:
+            self.session.unblock(_BLOCK)
+            return
+        (table, key), words = next(iter(faults.items()))
+        place = in_words(".".join(filter(None, (table, key))))
+        named = words if words.startswith(place) else f"{place}: {words}"
+        more = f" ({len(faults) - 1} more on the page Rig)" if len(faults) > 1 else ""
+        self.session.block(
+            _BLOCK, f"rig file: {named}{more}. {self._limits_in_force()}", self.title
+        )
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
+        if any(url.toLocalFile().endswith(".toml") for url in event.mimeData().urls()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802
+        names = [url.toLocalFile() for url in event.mimeData().urls()]
+        if names and not self.session.running:
+            self.open_file(Path(names[0]))
+        event.acceptProposedAction()
+
+    # display
+
+    @Slot()
+    def _show_outcome(self) -> None:
+        outcome, theme = self.outcome, self.session.theme
+        self.findings.setRowCount(0 if outcome is None else len(outcome.findings))
+        if outcome is None:
+            self.summary.show_text(
+                f"{self.session.address} is not checked yet. Check reads every instrument; the "
+                f"output stays at 0 V.",
+                "muted",
+            )
+            return
+        colours = {
+            "ok": theme.good, "warning": theme.warn, "wrong": theme.bad, "not wired": theme.muted
+        }  # fmt: skip
+        for row, finding in enumerate(outcome.findings):
+            verdict = f"{_SHAPES[finding.verdict]} {_WORDS[finding.verdict]}"
+            found = finding.found
+            if finding.verdict != "ok" and finding.wanted:
+                found += f"; expected {finding.wanted}"
+            if finding.advice:
+                found += f"; {finding.advice}"
+            for column, text in enumerate((verdict, finding.instrument, finding.item, found)):
+                item = QTableWidgetItem(readable(in_words(text)))
+                item.setToolTip(plain_tip(readable(in_words(finding.sentence))))
+                item.setFlags(Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled)
+                if column == 0:
+                    item.setForeground(QColor(colours[finding.verdict]))
+                self.findings.setItem(row, column, item)
+        wrong = any(f.verdict == "wrong" for f in outcome.findings)
+        self.summary.show_text(outcome.summary, "bad" if wrong else "good")
+
+    def _show_address(self) -> None:
+        address = self.session.address
+        body = address.partition(":")[2]
+        kind = "remote" if "@" in body else "local" if address.startswith("daqmx:") else "sim"
+        if address.startswith("sim:"):
+            kind = "hidden"
+            seed = body.partition(":")[0]
+            with QSignalBlocker(self.seed):  # shown, not chosen
+                self.seed.setValue(int(seed) if seed.isdigit() else 0)
+        if kind in ("local", "remote"):
+            device, _, server = body.partition("@")
+            self.device.setText(device)
+            if server:
+                self.server.setText(server)
+        self.kinds.button(_KINDS.index(kind)).setChecked(True)
+        self.seed.setEnabled(kind == "hidden")
+        self.device.setEnabled(kind in ("local", "remote"))
+        self.server.setEnabled(kind == "remote")
+        self._typing = False
+        self._block_address()
+
+    # layout
+
+    def _build(self) -> None:
+        outer = QHBoxLayout(self)
+        outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
+        outer.setSpacing(SPACE)
+        left = QVBoxLayout()
+        left.setSpacing(SPACE)
+        self.address_card = self._make_address_card()
+        left.addWidget(self.address_card)
+        left.addWidget(self._make_check_card(), 1)
+        outer.addLayout(left, 10)
+        self.editor = self._make_editor_card()
+        outer.addWidget(self.editor, 11)  # all its tabs are seen at 1366 px
+
+    def _make_address_card(self) -> QWidget:
+        grid = QGridLayout()
+        grid.addWidget(label("Rig", "heading"), 0, 0, 1, 3)
+        self.kinds = QButtonGroup(self)
+        self.seed = QSpinBox()
+        self.seed.setRange(0, 999_999)
+        self.seed.setValue(7)
+        self.seed.setMinimumHeight(24)  # as high as its neighbours
+        self.seed.setToolTip("Each seed is another film: with another hidden effect, or with none")
+        self.device = QLineEdit(self.session.rig_file.card.device)
+        self.device.setToolTip("Name of the card in NI MAX, for example Dev1")
+        self.server = QLineEdit("localhost:31763")
+        self.server.setToolTip("HOST:PORT of NI's gRPC device server")
+        for i, (words, tip, field) in enumerate(
+            (
+                ("&Simulated rig", "Simulated rig that follows the model exactly", None),
+                ("Simulated rig with a &hidden effect",
+                 "A film with an effect that the model lacks", self.seed),
+                ("&Card in this computer", "Local card, through NI-DAQmx", self.device),
+                ("Card on a &network server",
+                 "Card of another computer, through NI's gRPC device server", self.server),
+            )
+        ):  # fmt: skip
+            choice = QRadioButton(words)
+            choice.setToolTip(tip)
+            self.kinds.addButton(choice, i)
+            grid.addWidget(choice, i + 1, 0)
+            if field is not None:
+                grid.addWidget(field, i + 1, 1)
+        grid.setColumnStretch(1, 1)
+        self.kinds.idClicked.connect(self.choose)
+        self.seed.valueChanged.connect(self.choose)
+        for typed in (self.device, self.server):
+            typed.textEdited.connect(self._address_typed)
+            typed.editingFinished.connect(self.choose)
+        self.address_fault = Message()
+        grid.addWidget(self.address_fault, grid.rowCount(), 0, 1, 3)
+        return card(grid)
+
+    def _make_check_card(self) -> QWidget:
+        column = QVBoxLayout()
+        row = QHBoxLayout()
+        row.addWidget(label("Instruments", "heading"))
+        row.addStretch(1)
+        self.check_button = button(
+            "Chec&k", "Check every instrument; the output stays at 0 V (F7)", primary=True
+        )
+        self.check_button.setShortcut("F7")
+        self.check_button.clicked.connect(self.check)
+        row.addWidget(self.check_button)
+        column.addLayout(row)
+        self.summary = Message()
+        column.addWidget(self.summary)
+        self.findings = QTableWidget(0, 4)
+        self.findings.setHorizontalHeaderLabels(("", "Instrument", "Item", "Result"))
+        self.findings.verticalHeader().hide()
+        self.findings.setShowGrid(False)
+        self.findings.setWordWrap(True)
+        self.findings.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.findings.setTabKeyNavigation(False)
+        self.findings.setAccessibleName("Results of the check")
+        header = self.findings.horizontalHeader()
+        for i in (0, 2):
+            header.setSectionResizeMode(i, QHeaderView.ResizeMode.ResizeToContents)
+        header.resizeSection(1, 120)  # px; the tooltip has the whole name
+        header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
+        self.findings.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        column.addWidget(self.findings, 1)
+        return card(column)
+
+    def _make_editor_card(self) -> QWidget:
+        column = QVBoxLayout()
+        row = QHBoxLayout()
+        row.addWidget(label("Rig file", "heading"))
+        self.file_name = label("", "muted")
+        row.addWidget(self.file_name, 1)
+        open_button = button("&Open …", "Read a rig file; files can be dropped here (Ctrl+Shift+O)")
+        open_button.setShortcut(QKeySequence("Ctrl+Shift+O"))
+        open_button.clicked.connect(self._ask_open)
+        self.save_button = button("&Save", "Write the rig file to its file (Ctrl+S)")
+        self.save_button.setShortcut(QKeySequence("Ctrl+S"))
+        self.save_button.clicked.connect(self.save)
+        self.save_as_button = button(
+            "Save &as …", "Write the rig file to another file (Ctrl+Shift+S)"
+        )
+        self.save_as_button.setShortcut(QKeySequence("Ctrl+Shift+S"))
+        self.save_as_button.clicked.connect(self._ask_save)
+        defaults = button("&Thesis rig", "Use the rig file of the thesis")
+        defaults.clicked.connect(self._ask_defaults)
+        for made in (open_button, self.save_button, self.save_as_button, defaults):
+            row.addWidget(made)
+        column.addLayout(row)
+        self.trouble = Message()
+        column.addWidget(self.trouble)
+        self.state = Message()
+        column.addWidget(self.state)
+        self.tabs = QTabWidget()
+        self.tabs.setUsesScrollButtons(True)
+        for table in SECTIONS:
+            area = QScrollArea()
+            area.setWidgetResizable(True)
+            area.setFrameShape(QScrollArea.Shape.NoFrame)
+            area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+            self.tabs.addTab(area, table)
+            self._areas[table] = area
+        self.tabs.currentChanged.connect(self._tab_changed)
+        self.form("film")
+        column.addWidget(self.tabs, 1)
+        return card(column)
+
+    def form(self, table: str) -> Form:
+        """Return the form of one table of the rig file."""
+        if table not in self.forms:
+            values = section_values(self.text, table)
+            form = Form(form_fields(SECTIONS[table]), values, explain=True)
+            form.changed.connect(lambda key, value: self.set_value(table, key, value))
+            form.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
+            self._areas[table].setWidget(form)
+            self.forms[table] = form
+        return self.forms[table]
+
+    def show_table(self, table: str) -> None:
+        """Show the tab of one table of the rig file."""
+        self.tabs.setCurrentIndex(list(SECTIONS).index(table))
+
+    @Slot(int)
+    def _tab_changed(self, place: int) -> None:
+        self.form(list(SECTIONS)[place])
+        self._show_faults(faults_of(self.text))
+
+    @Slot()
+    def _ask_open(self) -> None:
+        folder = "" if self.file.path is None else self.file.path.parent
+        path = choose_file(self, self.session, "Rig file", folder, "Rig files (*.toml)")
+        if path is not None:
+            self.open_file(path)
+
+    @Slot()
+    def _ask_save(self) -> None:
+        start = self.file.path or Path()
+        path = save_as(
+            self, self.session, "Save the rig file", start, "Rig files (*.toml)", ".toml"
+        )
+        if path is not None:
+            self.save_file(path)
+
+    @Slot()
+    def _ask_defaults(self) -> None:
+        if may_drop(self, self.session, self.file, self.text):
+            self._take("", TextFile("rig file", ""))
+            self._show_all()

@@ -1,0 +1,1 @@
+"""Instruments next to the card: amplifier, laser, thermohygrometer."""

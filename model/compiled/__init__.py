@@ -1,0 +1,1 @@
+"""Compiled kernels: decorators, disk cache, other distributions' sources."""

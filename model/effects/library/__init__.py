@@ -1,0 +1,1 @@
+"""The effects of this project, in folders by what they act on."""

@@ -1,0 +1,27 @@
+"""Leakage by charges that hop over equal barriers, with the field and against it.
+
+The current goes with sinh(b E) (Mott and Gurney 1940; Eyring): at small fields the film is a
+plain resistor, unlike leakage by traps; at large ones the current grows exponentially.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dearig.model.compiled.jit import jit
+from dearig.model.effects.library.electric.leakage import EFFECT as BY_TRAPS
+from dearig.model.effects.shared.conduction import HOPS, behind
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = replace(
+    BY_TRAPS,
+    name="hopping leakage",
+    summary="the film draws a current at any voltage, exponentially more at a high one",
+    parameters=(BY_TRAPS.parameters[0], replace(BY_TRAPS.parameters[1], starts=(1.0, 4.0))),
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    return behind(m, j, c[k], c[k + 1], HOPS, start, end, h, lam, 1.0)

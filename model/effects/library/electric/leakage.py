@@ -1,0 +1,53 @@
+"""Leakage through the film: its current drops part of the voltage in the electrodes.
+
+The conductivity grows as exp(b E^n): the field frees charges from traps (n = 1/2; Frenkel, Phys.
+Rev. 54, 647 (1938)) or lowers barriers in proportion (n = 1; Poole). So nothing is lost at small
+voltages, and most at the peak.
+"""
+
+from __future__ import annotations
+
+from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.shared.conduction import REMEMBERED, behind
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = Effect(
+    name="leakage",
+    family="leakage",
+    acts_on="electrode",
+    summary="the film gets less voltage than the amplifier supplies, the more the higher it is",
+    parameters=(
+        Parameter(
+            "loss",
+            "",
+            (0.0, 0.5),
+            "relative loss of voltage at 8 kV, film unstretched",
+            0.02,
+            0.0,
+        ),
+        Parameter(
+            "growth",
+            "",
+            (0.5, 20.0),
+            "of the conductivity with the field",
+            2.0,
+            starts=(2.0, 4.0, 12.0),
+        ),
+        Parameter(
+            "exponent",
+            "",
+            (0.5, 1.0),
+            "of the field: 1/2 for traps (Poole-Frenkel), 1 for barriers (Poole)",
+            0.1,
+            starts=(0.5, 1.0),
+        ),
+    ),
+    memory=REMEMBERED,
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    return behind(m, j, c[k], c[k + 1], c[k + 2], start, end, h, lam, 1.0)

@@ -1,0 +1,83 @@
+"""Electrode as a sheet: charge spreads from the contact at one edge over the film.
+
+Along the sheet the voltage obeys a diffusion equation, C R_s dV/dt = V'' on a length of one, with
+the contact's resistance R_c at the edge: beta = R_s/R_c. It is solved by modes, mu tan(mu) = beta,
+each a lag of R_s C/mu^2. Its share 2 beta^2/(mu^2 (mu^2 + beta^2 + beta)) of the mean square of
+the voltage is that of the mean temperature of a plate in heat conduction (Carslaw and
+Jaeger, section 3.11). Three modes represent all: the third has the rest, a tenth. As
+in ``electrode resistance`` the capacitance C = C_0 (Z/z)^2 grows with stretch.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from dearig.model.coefficients import CAPACITANCE, HELD
+from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Parameter
+from dearig.model.effects.library.electric.electrode_resistance import EFFECT as LUMPED
+from dearig.model.effects.shared.filters import lagged
+from dearig.model.kinematics import thinning_squared
+
+__all__ = ["EFFECT", "supply"]
+
+_MODES = 3
+_HALVINGS = 50  # of the interval in which a root lies: to the last digit
+
+EFFECT = replace(
+    LUMPED,
+    name="sheet electrode",
+    summary="the electrode charges as a sheet: late where it is far from the contact",
+    parameters=(
+        replace(LUMPED.parameters[0], meaning="of contact and sheet, end to end"),
+        Parameter(
+            "contact",
+            "",
+            (0.02, 0.95),
+            "fraction of the resistance at the contact",
+            0.1,
+            starts=(0.2,),
+        ),
+    ),
+    memory=2 * _MODES,
+)
+
+
+@jit
+def _mode(beta, n):
+    """Root mu of mu tan(mu) = ``beta`` in the ``n``-th half period from 0."""
+    low, high = 0.0, 0.5 * math.pi
+    for _ in range(_HALVINGS):
+        a = 0.5 * (low + high)
+        if (n * math.pi + a) * math.sin(a) < beta * math.cos(a):
+            low = a
+        else:
+            high = a
+    return n * math.pi + 0.5 * (low + high)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    # charge as voltage times (Z/z)^2, as where the electrode is one resistance
+    held, half = int(c[HELD]), 0.5 * h * rate
+    first, last = thinning_squared(held, lam - half), thinning_squared(held, lam + half)
+    sheet = (1.0 - c[k + 1]) * c[k]
+    beta = (1.0 - c[k + 1]) / c[k + 1]
+    tau = sheet * c[CAPACITANCE] * thinning_squared(held, lam)
+    before, after, left = 0.0, 0.0, 1.0
+    for i in range(_MODES):
+        if m[j + _MODES + i] == 0.0:
+            m[j + _MODES + i] = _mode(beta, i)  # once: it is the contact's alone
+        mu2 = m[j + _MODES + i] ** 2
+        share = 2.0 * beta * beta / (mu2 * (mu2 + beta * beta + beta))
+        if i == _MODES - 1:
+            share = left
+        left -= share
+        before += share * m[j + i] ** 2
+        m[j + i] = lagged(m[j + i], first * start, last * end, h, tau / mu2)
+        after += share * m[j + i] ** 2
+    return (
+        math.copysign(math.sqrt(before), m[j]) / first,
+        math.copysign(math.sqrt(after), m[j]) / last,
+    )

@@ -1,0 +1,37 @@
+"""Resistance of electrodes that lose contact as they are stretched, or gain it.
+
+As ``electrode resistance``, with R = R_0 exp(g (lam - lam_rest)): carbon black, grease and thin
+metal change their resistance with strain, by a gauge factor g of a few, and of tens near
+percolation.
+"""
+
+from __future__ import annotations
+
+import math
+
+from dearig.model.coefficients import REST
+from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.library.electric.electrode_resistance import charged
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = Effect(
+    name="strained electrode",
+    family="electrode_resistance",
+    acts_on="electrode",
+    summary="the film charges through a resistance that changes with the stretch",
+    parameters=(
+        Parameter("resistance", "ohm", (0.0, 5e9), "between the amplifier and the film", 1e7, 0.0),
+        Parameter(
+            "gauge", "", (-60.0, 60.0), "factor of the resistance with stretch", 5.0, starts=(10.0,)
+        ),
+    ),
+    memory=1,
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    resistance = c[k] * math.exp(c[k + 1] * (lam - c[REST]))
+    return charged(c, m, j, resistance, start, end, h, lam, rate)

@@ -1,0 +1,1 @@
+"""General laws, one for each family: weights over given shapes."""

@@ -1,0 +1,93 @@
+"""Creep of any form: Maxwell branches on a fixed grid of relaxation times.
+
+Ten branches as in ``slow_branch`` beside the network; each relaxes twice as slowly as the one
+before. Their moduli are the weights. A branch between two nodes is met to (ln 2)^2/32 = 1.5 %.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from dearig.model.coefficients import REST
+from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.shared.filters import lagged
+
+__all__ = ["EFFECT", "commit", "stiffness", "stress"]
+
+_BRANCHES = 10
+_RATIO = 2.0  # of neighbouring relaxation times
+
+
+def _relaxation(values: Mapping[str, float]) -> Curve:
+    """Return the relaxation modulus over time."""
+    times = values["relaxation_time"] * _RATIO ** np.arange(float(_BRANCHES))
+    time = np.geomspace(0.1 * times[0], times[-1], 60)
+    moduli = np.array([values[f"modulus_{i + 1}"] for i in range(_BRANCHES)])
+    return Curve(
+        time, np.exp(-time[:, None] / times) @ moduli, "time (s)", "relaxation modulus (Pa)"
+    )
+
+
+EFFECT = Effect(
+    name="general creep",
+    family="creep",
+    acts_on="film stress",
+    summary="the film creeps over seconds to minutes, with relaxation times of any distribution",
+    parameters=(
+        *(
+            Parameter(f"modulus_{i + 1}", "Pa", (0.0, 1e7), f"of branch {i + 1}", 300.0, 0.0)
+            for i in range(_BRANCHES)
+        ),
+        Parameter(
+            "relaxation_time",
+            "s",
+            (0.05, 100.0),
+            "of the first branch",
+            0.8,
+            starts=(0.8, 0.1),
+            logarithmic=True,
+        ),
+    ),
+    memory=_BRANCHES,
+    drives=("voltage", "stretch"),
+    is_general=True,
+    curve=_relaxation,
+)
+
+
+@jit
+def _relaxed(c, k, m, j, lam0, lam, since, commits):
+    e0, e = math.log(lam0 / c[REST]), math.log(lam / c[REST])
+    time = c[k + _BRANCHES] * 0.5 * (lam0 + lam) / c[REST]
+    total = 0.0
+    for i in range(_BRANCHES):
+        if c[k + i] > 0.0:
+            q = lagged(m[j + i], e0, e, since, time)
+            total += c[k + i] * (e - q)
+            if commits:
+                m[j + i] = q
+        time *= _RATIO
+    return total * c[REST] / lam
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return _relaxed(c, k, m, j, lam0, lam, since, False)
+
+
+@jit
+def stiffness(c, k, m, j, lam, rate):
+    total = 0.0
+    for i in range(_BRANCHES):
+        total += c[k + i]
+    return total, 0.0
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    _relaxed(c, k, m, j, lam0, lam, h, True)
+    return 0

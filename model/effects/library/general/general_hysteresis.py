@@ -1,0 +1,70 @@
+"""Rate-independent hysteresis of any form: Prandtl and Ishlinskii's sum of yielding elements.
+
+Ten elements side by side, each a spring that yields beyond its threshold of stretch; the thresholds
+are a geometric series up to the reach. The yield stresses are the weights (Visintin, Differential
+Models of Hysteresis, 1994). It has every loop that obeys Masing's rules, between its thresholds to
+a straight line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.shared.yield_elements import carry, first_loading, pull, slope
+
+__all__ = ["EFFECT", "commit", "stiffness", "stress"]
+
+_ELEMENTS = 10
+_RATIO = 1.7  # of neighbouring thresholds
+
+
+def _loading(values: Mapping[str, float]) -> Curve:
+    return first_loading(values, _ELEMENTS, _RATIO)
+
+
+EFFECT = Effect(
+    name="general hysteresis",
+    family="rate_independent_hysteresis",
+    acts_on="film stress",
+    summary="hysteresis loops of any form, at any speed",
+    parameters=(
+        *(
+            Parameter(
+                f"yield_{i + 1}", "Pa", (0.0, 1e5), f"yield stress of element {i + 1}", 15.0, 0.0
+            )
+            for i in range(_ELEMENTS)
+        ),
+        Parameter(
+            "reach",
+            "",
+            (1e-3, 4.0),
+            "change of stretch at which the last element yields",
+            2.4e-2,
+            starts=(2.4e-2, 1.0),
+            logarithmic=True,
+        ),
+    ),
+    memory=_ELEMENTS,
+    drives=("voltage", "stretch"),
+    is_hysteretic=True,
+    is_general=True,
+    curve=_loading,
+)
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return pull(c, k, m, j, lam - lam0, _ELEMENTS, _RATIO)
+
+
+@jit
+def stiffness(c, k, m, j, lam, rate):
+    return slope(c, k, _ELEMENTS, _RATIO), 0.0
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    carry(c, k, m, j, lam - lam0, _ELEMENTS, _RATIO)
+    return 0

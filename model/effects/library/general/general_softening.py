@@ -1,0 +1,127 @@
+"""Softening by the largest change of stretch so far, of any form.
+
+With steps B_i (``model.splines``), e the change of stretch from rest and e_max its largest value so
+far, which heals (falls towards e) with a time, the network carries
+
+    1 - sum_i d_i B_i(e_max) - e_max/(e_max + e_0) sum_i r_i B_i(p)
+    p = (e_max - e)/(e_max + w) (R + w)/R
+
+of its stress: damage d that stays, as on first loading (even knots up to the reach R), and a loss r
+that is regained on the way back to the largest stretch. A wide w makes it depend on how far below
+that the film is (Ogden and Roxburgh, Proc. R. Soc. A 455, 1999), a narrow one on the part of the
+way; between them is their form with a width that grows with the largest stretch. The stretch
+e_0 = 0.001 keeps a film that was never stretched from softening by small vibrations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from dearig.model.coefficients import EFFECTS_AT, REST
+from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.shared.splines import step
+
+__all__ = ["EFFECT", "commit", "soften"]
+
+_STEPS = 6
+_PARTS = 5
+_TREMOR = 1e-3  # of stretch
+
+
+def _loss(values: Mapping[str, float]) -> Curve:
+    """Return the loss at rest after the largest change of stretch."""
+    stretch = np.linspace(0.0, values["reach"] * (1.0 + 1.0 / _STEPS), 60)
+    c = np.array([*[0.0] * EFFECTS_AT, *(values[p.name] for p in EFFECT.parameters)])
+    rest = float(c[REST])
+    kept = [soften(c, EFFECTS_AT, np.array([e]), 0, rest, 0.0, 0.0, 0.0) for e in stretch]
+    return Curve(
+        stretch, 1.0 - np.array(kept), "largest change of stretch", "relative loss of stress"
+    )
+
+
+EFFECT = Effect(
+    name="general softening",
+    family="softening",
+    acts_on="film stress",
+    summary="the film loses stress with its largest stretch so far, for good or below it",
+    parameters=(
+        *(
+            Parameter(f"damage_{i}", "", (0.0, 0.5), f"loss that stays at step {i}", 5e-4, 0.0)
+            for i in range(1, _STEPS + 1)
+        ),
+        *(
+            Parameter(
+                f"regained_{i}", "", (0.0, 0.5), f"loss that is regained at part {i}", 5e-4, 0.0
+            )
+            for i in range(1, _PARTS + 1)
+        ),
+        Parameter(
+            "reach",
+            "",
+            (2e-3, 5.0),
+            "change of stretch at the last step",
+            2.4e-2,
+            starts=(2.4e-2, 1.0),
+            logarithmic=True,
+        ),
+        Parameter(
+            "width",
+            "",
+            (1e-3, 1.0),
+            "change of stretch from which on the loss depends on the part of the way back",
+            1e-3,
+            starts=(1e-3, 1.0),
+            logarithmic=True,
+        ),
+        Parameter(
+            "healing_time",
+            "s",
+            (1.0, 1e5),
+            "in which the largest stretch is forgotten",
+            1e4,
+            starts=(1e4, 40.0),
+            logarithmic=True,
+        ),
+    ),
+    memory=1,
+    is_hysteretic=True,
+    drives=("voltage", "stretch"),
+    is_general=True,
+    fitted_shapes=("width", "healing_time"),
+    curve=_loss,
+)
+
+
+@jit
+def _largest(c, k, before, now, since):
+    left = math.exp(-since / c[k + _STEPS + _PARTS + 2])
+    return now + max(before - now, 0.0) * left
+
+
+@jit
+def soften(c, k, m, j, lam, since, t, warmth):
+    now = abs(lam - c[REST])
+    reach, width = c[k + _STEPS + _PARTS], c[k + _STEPS + _PARTS + 1]
+    most, spacing, lost = _largest(c, k, m[j], now, since), reach / _STEPS, 0.0
+    for i in range(_STEPS):
+        if c[k + i] > 0.0:
+            left = i * spacing
+            lost += c[k + i] * step(most, left, left + spacing, left + 2.0 * spacing)
+    part, wide = (most - now) / (most + width) * (1.0 + width / reach), 1.0 / (_PARTS - 1)
+    begun = most / (most + _TREMOR)
+    for i in range(_PARTS):
+        if c[k + _STEPS + i] > 0.0:
+            middle = i * wide
+            there = step(part, max(middle - wide, 0.0), middle, middle + wide)
+            lost += c[k + _STEPS + i] * begun * there
+    return 1.0 - lost
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    m[j] = _largest(c, k, m[j], abs(lam - c[REST]), h)
+    return 0

@@ -1,0 +1,1 @@
+"""Effects of film stress, load and guide."""

@@ -1,0 +1,47 @@
+"""Creep by one more slow branch: a spring in series with a dashpot, beside the network."""
+
+from __future__ import annotations
+
+from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.shared.creep import relaxed
+
+__all__ = ["EFFECT", "commit", "stiffness", "stress"]
+
+EFFECT = Effect(
+    name="slow branch",
+    family="creep",
+    acts_on="film stress",
+    summary="the film keeps creeping with one more relaxation time",
+    parameters=(
+        Parameter("modulus", "Pa", (0.0, 1e7), "of the branch", 2e3, 0.0),
+        Parameter(
+            "relaxation_time",
+            "s",
+            (1.0, 3e4),
+            "of the branch",
+            30.0,
+            starts=(20.0, 4.0, 200.0),
+            logarithmic=True,
+        ),
+    ),
+    memory=1,
+    drives=("voltage", "stretch"),
+    is_viscoelastic=True,
+)
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return relaxed(c, m, j, lam0, lam, since, False, 1, c[k], 1.0, c[k + 1], 1.0)
+
+
+@jit
+def stiffness(c, k, m, j, lam, rate):
+    return c[k], 0.0
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    relaxed(c, m, j, lam0, lam, h, True, 1, c[k], 1.0, c[k + 1], 1.0)
+    return 0

@@ -1,0 +1,1 @@
+"""Effects of the air of the room."""

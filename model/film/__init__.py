@@ -1,0 +1,1 @@
+"""The film: material, network of springs, kinematics, specimen, its reading."""

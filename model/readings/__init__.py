@@ -1,0 +1,1 @@
+"""Records of readings that a fit takes: noise, spikes, errors, air of the room."""

@@ -1,0 +1,1 @@
+"""Simulation of the actuator under voltage and of a strip under stretch."""

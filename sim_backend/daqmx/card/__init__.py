@@ -1,0 +1,1 @@
+"""The card: tasks, clocks, triggers, outputs, inputs and their wiring."""

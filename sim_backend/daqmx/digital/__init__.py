@@ -1,0 +1,1 @@
+"""Digital lines, counters and pulses of the card."""

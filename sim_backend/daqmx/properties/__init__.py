@@ -1,0 +1,1 @@
+"""Properties of card, tasks, channels, timing and triggers."""

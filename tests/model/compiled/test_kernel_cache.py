@@ -1,0 +1,173 @@
+"""The cache of compiled kernels: trusted or not used, and never a reason to fail."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import dearig.model.kernel.drive as drive_kernel
+from dearig.model import kernel
+from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.simulation import film_kernel
+from dearig.model.simulation.actuator import Actuator, Drive, reading_of
+from dearig.model.simulation.strip import Strip
+
+#: A kernel of its own file: numba keeps it in the folder that ``jit`` chose.
+KERNEL = """
+from dearig.model.compiled.jit import jit
+
+@jit
+def twice(x):
+    return 2.0 * x
+"""
+RUN = """
+import sys
+sys.path.insert(0, {folder!r})
+from dearig.model.compiled.jit import cache_folder, cache_note
+import kernel
+{before}
+print(kernel.twice(21.0), cache_folder(), cache_note() or "usual", sep="\\n")
+"""
+
+
+def run(folder: Path, before: str = "", **environment: str) -> list[str]:
+    """Value, cache folder and note of a process that compiles or reads the kernel."""
+    (folder / "kernel.py").write_text(KERNEL, encoding="utf-8")
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA_", "XDG_"))}
+    ended = subprocess.run(
+        [sys.executable, "-c", RUN.format(folder=str(folder), before=before)],
+        env={**clean, **environment}, cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    value, where, note = ended.stdout.splitlines()
+    assert value == "42.0"
+    return [where, note]
+
+
+class Planted:
+    """A pickle that leaves a file where it is loaded."""
+
+    def __init__(self, mark: Path) -> None:
+        self.mark = mark
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Path.touch, (self.mark,)
+
+
+def indices(cache: Path) -> list[Path]:
+    return [p for p in cache.rglob("*.nbi") if p.name.startswith("kernel.twice")]
+
+
+def test_a_kernel_is_kept_and_found_again(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    where, note = run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+    assert Path(where).parent == cache.resolve()
+    assert note == "usual"
+    assert len(indices(cache)) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="modes of this kind are not there on Windows")
+def test_planted_code_in_a_folder_that_others_may_write_to_is_not_run(tmp_path: Path) -> None:
+    cache, mark = tmp_path / "cache", tmp_path / "mark"
+    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+    (index,) = indices(cache)
+    index.write_bytes(pickle.dumps(Planted(mark)))
+    cache.chmod(0o777)
+    (tmp_path / "tmp").mkdir()
+    where, note = run(tmp_path, NUMBA_CACHE_DIR=str(cache), TMPDIR=str(tmp_path / "tmp"))
+    assert not mark.exists()
+    assert not Path(where).is_relative_to(cache)
+    assert "everyone may write to" in note
+
+
+@pytest.mark.skipif(os.name == "nt", reason="modes of this kind are not there on Windows")
+def test_a_planted_file_in_a_folder_that_was_open_once_is_not_run(tmp_path: Path) -> None:
+    cache, mark = tmp_path / "cache", tmp_path / "mark"
+    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+    (index,) = indices(cache)
+    index.write_bytes(pickle.dumps(Planted(mark)))
+    index.chmod(0o666)
+    where, note = run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+    assert not mark.exists()
+    assert where.endswith("-private")
+    assert index.name in note
+
+
+def test_numbas_own_choice_of_folders_is_not_followed(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    run(tmp_path, NUMBA_CACHE_DIR=str(cache), NUMBA_CACHE_LOCATOR_CLASSES="InTreeCacheLocator")
+    assert not (tmp_path / "__pycache__").exists() or not indices(tmp_path / "__pycache__")
+    assert len(indices(cache)) == 1
+
+
+@pytest.mark.parametrize("damage", [b"", b"\x80", b"garbage", b"\x80\x05K\x01.rest"])
+def test_a_damaged_cache_is_compiled_again(tmp_path: Path, damage: bytes) -> None:
+    cache = tmp_path / "cache"
+    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+    (index,) = indices(cache)
+    whole = index.read_bytes()
+    index.write_bytes(damage)
+    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+    assert index.read_bytes() == whole  # and kept, for the next time
+    (data,) = (p for p in cache.rglob("*.nbc") if p.name.startswith("kernel.twice"))
+    data.write_bytes(damage)
+    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a limit to the size of files is Linux's")
+def test_a_full_disk_costs_time_and_no_result(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    full = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))"
+    )
+    run(tmp_path, full, NUMBA_CACHE_DIR=str(cache))
+    assert not indices(cache)
+
+
+def test_without_a_cache_the_hooks_of_the_effects_are_compiled_from_memory(tmp_path: Path) -> None:
+    nowhere = str(tmp_path / "file")
+    Path(nowhere).touch()
+    code = (
+        "import dearig.model.compiled.trusted_folder as t; t._temporary = lambda: iter(());"
+        "from dearig.model.compiled.jit import cache_folder; assert cache_folder() is None;"
+        "from dearig.model.effects import assembly; assert callable(assembly.inertia)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "NUMBA_CACHE_DIR": f"{nowhere}/x"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+
+
+def compiled_versions(*modules: ModuleType) -> int:
+    """The number of argument types for which the kernels of ``modules`` are compiled here."""
+    kernels = [v for m in modules for v in vars(m).values() if hasattr(v, "overloads")]
+    return sum(len(k.overloads) for k in kernels)
+
+
+def test_no_kernel_is_compiled_anew_for_arrays_that_cannot_be_written() -> None:
+    """Those of a file cannot be written; whoever fits one first would wait half a minute more."""
+    time = np.linspace(0.0, 0.1, 11)
+    fixed, pulled = time.copy(), 1.0 + time
+    fixed.flags.writeable = pulled.flags.writeable = False
+    drag = (("linear drag", (("drag", 50.0),)),)
+    film = Strip(TABLE_3, effects=drag)
+    thesis = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+    film.simulate(time, 1.0 + time)
+    thesis.simulate(Drive(time, time))
+    before = compiled_versions(film_kernel, drive_kernel)
+    film.simulate(fixed, 1.0 + time)
+    film.simulate(fixed, pulled)
+    for hold in (True, False):
+        drive = Drive(fixed, fixed, hold)
+        thesis.simulate(drive)
+        reading_of(thesis.coefficients(), 0.1, drive, fidelity=kernel.QUICK)
+    assert compiled_versions(film_kernel, drive_kernel) == before

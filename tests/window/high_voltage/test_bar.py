@@ -1,0 +1,235 @@
+"""The bar on every page: what was measured of the high voltage, the latched alarm, and STOP."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+import pytest
+from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtGui import QFont, QFontMetrics
+from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
+from pytestqt.qtbot import QtBot
+
+from dearig.output_state import Known, OutputState
+from dearig.recording import open_recording
+from dearig.recording.verify import verify
+from dearig.sim_backend.faults import FaultPlan
+from dearig.window.high_voltage.state import HighVoltage, kilovolts
+from dearig.window.high_voltage.status import HighVoltageStatus, LatchedAlarm
+from dearig.window.run.page import RunPage
+from dearig.window.session.state import Session
+from dearig.window.shell.frame import MainWindow
+from tests.window.conftest import SHORT
+
+LEFT = Qt.MouseButton.LeftButton
+RUN_MS = 60_000
+ARC = "arc@0.5+0.2"
+
+
+def play(qtbot: QtBot, page: RunPage) -> None:
+    qtbot.mouseClick(page.arm_button, LEFT)
+    with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS):
+        qtbot.mouseClick(page.start_button, LEFT)
+
+
+def test_stop_can_be_clicked_on_every_page(
+    qtbot: QtBot, quick_ramp: Session, window: MainWindow, plan_of: Callable[[str], None]
+) -> None:
+    page, bar = window.run_page, window.bar
+    plan_of(SHORT)
+    page.paced.setChecked(True)
+    for other in window.pages:
+        window.show_page(page)
+        qtbot.mouseClick(page.arm_button, LEFT)
+        window.show_page(other)
+        assert bar.badge.state is HighVoltage.ARMED
+        qtbot.mouseClick(page.start_button, LEFT)
+        with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
+            assert bar.badge.state is HighVoltage.ON
+            # what lies at this place of the window is STOP: nothing covers it
+            centre = bar.stop_button.mapTo(window, bar.stop_button.rect().center())
+            assert window.childAt(centre) is bar.stop_button
+            qtbot.mousePress(bar.stop_button, LEFT)  # it does not wait for the release
+            qtbot.mouseRelease(bar.stop_button, LEFT)
+        assert ended.args[0].headline == "Stopped"
+
+
+def test_the_bar_shows_the_monitor_and_the_time_and_greys_the_last_sample(
+    qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
+) -> None:
+    page, bar = window.run_page, window.bar
+    plan_of(SHORT.replace("frequency_Hz = 2.0", "frequency_Hz = 0.2"))  # above 1 kV for 2 s
+    page.paced.setChecked(True)
+    qtbot.mouseClick(page.arm_button, LEFT)
+    qtbot.mouseClick(page.start_button, LEFT)
+    window.show_page(window.rig_page)
+    qtbot.waitUntil(
+        lambda: float(bar.monitor.text().split()[0].replace("—", "0")) > 1.0, timeout=RUN_MS
+    )
+    assert bar.time.text().endswith("s")
+    assert bar.monitor.property("role") != "muted"
+    qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)
+    recording = open_recording(next(window.session.folder.glob("*.h5")))
+    seconds = recording.samples / recording.rate
+    assert bar.time.text() == f"last sample,\n{seconds:.2f} s"
+    assert bar.monitor.property("role") == "muted"
+    assert page.controls.of_sample.text() == f"last sample, {seconds:.2f} s"
+    assert page.controls.numbers["monitor"]._value.property("role") == "muted"
+
+
+def test_a_state_at_rest_is_a_measurement_with_its_time(
+    qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
+) -> None:
+    page, bar = window.run_page, window.bar
+    assert bar.badge.state is HighVoltage.NOT_CONTACTED
+    assert "was not read" in bar.detail.text()
+    plan_of(SHORT)
+    play(qtbot, page)
+    output = page.runner.status.output
+    assert output is not None
+    assert bar.badge.state is HighVoltage.CONFIRMED
+    assert bar.detail.text().startswith(f"0 V confirmed by the monitor at {output.time}")
+    # it is that of this rig, not of another one
+    window.session.set_address("sim:7")
+    assert bar.badge.state is HighVoltage.NOT_CONTACTED
+    window.session.set_address("sim")
+    assert bar.badge.state is HighVoltage.CONFIRMED
+
+
+def test_an_interlock_latches_until_somebody_acknowledges_it(
+    qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None],
+    caplog: pytest.LogCaptureFixture,
+) -> None:  # fmt: skip
+    page, bar, session = window.run_page, window.bar, window.session
+    plan_of(SHORT)
+    page.faults = FaultPlan.parse([ARC])
+    play(qtbot, page)
+    page.faults = None
+    path = next(session.folder.glob("*.h5"))
+    assert "Stopped by an interlock" in bar.alarm.full_text
+    assert bar.badge.state is HighVoltage.CONFIRMED  # the monitor was read after it
+    for _ in range(2):
+        for other in window.pages:
+            window.show_page(other)
+            assert bar.alarm.isVisible()
+            qtbot.keyClick(window, Qt.Key.Key_F5)
+            page.arm_button.click()
+            assert not page.runner.armed
+    assert "acknowledge" in page.blocked.text()
+    plan_of(SHORT.replace("6.0", "5.0"))
+    session.set_address("sim:3")
+    assert bar.alarm.isVisible()
+    session.set_address("sim")
+
+    def sign() -> None:
+        dialog = next(
+            w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog) and w.isVisible()
+        )
+        assert not dialog.accept_button.isEnabled()  # a name is needed
+        dialog.findChild(QLineEdit).setText("Grace")
+        dialog.accept_button.click()
+
+    session.set_notes("", "", "")
+    QTimer.singleShot(0, sign)
+    with caplog.at_level(logging.WARNING):
+        qtbot.mouseClick(bar.acknowledge_button, LEFT)
+    assert not bar.alarm.isVisible()
+    assert page.alarms.pending == 0  # the list of alarms has it too
+    assert "Grace acknowledged the alarm: Stopped by an interlock" in caplog.text
+    qtbot.waitUntil(lambda: page.arm_button.isEnabled(), timeout=RUN_MS)
+    bar.close_work()
+    recording = open_recording(path)
+    assert recording.events[-1].message.startswith("Grace acknowledged: Stopped by an interlock")
+    assert verify(path).sound
+
+
+def test_an_end_without_a_reading_latches_too(qtbot: QtBot, session: Session) -> None:
+    status = HighVoltageStatus(session)
+    status.set_phase(HighVoltage.ON)
+    status.set_output(OutputState(Known.COMMANDED, 0.0))
+    status.set_phase(None)
+    assert status.state is HighVoltage.COMMANDED
+    assert "not confirmed" in status.detail
+
+
+def test_what_is_unknown_is_shown_while_the_run_still_waits(session: Session) -> None:
+    """The guardian may try for 20 s; the operator must not see HIGH VOLTAGE of a dead link."""
+    status = HighVoltageStatus(session)
+    status.set_phase(HighVoltage.RAMPING)
+    status.set_output(OutputState(Known.UNKNOWN, 0.0))
+    assert status.state is HighVoltage.UNKNOWN
+    assert "switch the amplifier off" in status.detail
+    assert not status.live
+
+
+def test_the_alarm_of_a_real_rig_outlives_the_program(session: Session) -> None:
+    session.set_address("daqmx:Dev1")
+    first = HighVoltageStatus(session)
+    first.run_begins()
+    # the program has died in the run
+    again = Session(session.folder, session.settings, address="daqmx:Dev1")
+    status = HighVoltageStatus(again)
+    assert status.state is HighVoltage.UNKNOWN
+    assert status.alarm is not None
+    assert "ended during what was started" in status.alarm.headline
+    assert again.blocks
+    status.acknowledge("Ada")
+    assert not again.blocks
+    third = Session(session.folder, session.settings, address="daqmx:Dev1")
+    assert HighVoltageStatus(third).alarm is None
+    # a run that ends well leaves nothing
+    first.run_begins()
+    first.run_ended(None)
+    assert HighVoltageStatus(third).alarm is None
+
+
+def test_an_alarm_is_not_released_without_a_name(session: Session) -> None:
+    status = HighVoltageStatus(session)
+    status.run_ended(LatchedAlarm("Stopped by an interlock", "arc", 0.0, "sim"))
+    assert status.acknowledge("  ") is None
+    assert status.alarm is not None
+    assert session.blocks
+
+
+@pytest.mark.parametrize("volts", [-0.4, 0.0, 0.4, -4.9])
+def test_zero_is_never_minus_zero(volts: float) -> None:
+    assert kilovolts(volts) == "0.00 kV"
+
+
+def test_the_bar_is_inside_the_smallest_screen(qtbot: QtBot, window: MainWindow) -> None:
+    """1366x768 at a scale of 1.5, without the panel of a desktop and the frame of a window."""
+    smallest = window.minimumSizeHint()
+    assert smallest.width() <= 910
+    assert smallest.height() <= 440
+    window.resize(910, 440)
+    bar = window.bar
+    for alarm in (None, LatchedAlarm("Stopped by an interlock", "arc " * 100, 0.0, "sim")):
+        window.run_page.runner.status.run_ended(alarm)
+        for state in HighVoltage:
+            bar.badge.show_state(state)
+            for part in (bar.stop_button, bar.badge, bar.monitor):
+                corner = part.mapTo(window, QPoint(0, 0))
+                area = window.rect()
+                assert area.contains(corner)
+                assert area.contains(corner + QPoint(part.width() - 1, part.height() - 1))
+        words = QFontMetrics(bar.stop_button.font()).horizontalAdvance("⬣  0 V NOW")
+        assert bar.stop_button.width() >= words
+    window.run_page.runner.status.run_ended(None)
+
+
+def test_words_on_the_badge_fit(qtbot: QtBot, window: MainWindow) -> None:
+    """Every state is written whole: its letters become smaller where they would be cut."""
+    badge = window.bar.badge
+    font = QFont(badge.font())
+    font.setBold(True)
+    font.setPixelSize(12)
+    for state in HighVoltage:
+        assert QFontMetrics(font).horizontalAdvance(state.value) < badge.width() - badge.height()
+
+
+def test_a_long_headline_is_not_cut(qtbot: QtBot, run_page: RunPage) -> None:
+    shown: QWidget = run_page.controls.time_left
+    assert run_page.controls.time_left.wordWrap()
+    run_page.controls.time_left.setText("Stopped by an interlock")
+    qtbot.waitUntil(lambda: shown.height() >= shown.heightForWidth(shown.width()))
