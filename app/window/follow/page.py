@@ -34,9 +34,9 @@ from dearig.report.text.tables import Table
 from dearig.units import readable
 from dearig.window.follow.hold_panel import HoldPanel
 from dearig.window.follow.jobs import (
-    Followed,
     FollowRequest,
-    Played,
+    PlayedRun,
+    TrackingState,
     begin_following,
     learn_from,
     write_report,
@@ -81,7 +81,7 @@ class FollowPage(QWidget):
         self._session = session
         self._worker = worker or Worker(self)
         self._job: Job | None = None
-        self._followed: Followed | None = None
+        self._followed: TrackingState | None = None
         self._folder: Path | None = None  # of the sequences that were shown
         self._awaited = ""  # TOML of the sequence that was shown on the page Run
         self._recorded_meanwhile: Path | None = None  # while a job went on
@@ -115,7 +115,7 @@ class FollowPage(QWidget):
     # what the page offers
 
     @property
-    def followed(self) -> Followed | None:
+    def followed(self) -> TrackingState | None:
         """The target that is followed, and its runs."""
         return self._followed
 
@@ -204,13 +204,13 @@ class FollowPage(QWidget):
         self._refresh()
 
     @Slot(object)
-    def _begun(self, followed: Followed) -> None:
+    def _begun(self, followed: TrackingState) -> None:
         self._folder = None
         self._await("")
         self._show(followed)
 
     @Slot(object)
-    def _learned(self, followed: Followed | None) -> None:
+    def _learned(self, followed: TrackingState | None) -> None:
         if followed is None:  # another sequence was played
             return
         self._await("")
@@ -248,7 +248,7 @@ class FollowPage(QWidget):
             )
             return
         job = self._worker.submit(
-            learn_from, self._followed, Played(path, self._awaited), self._session.film
+            learn_from, self._followed, PlayedRun(path, self._awaited), self._session.film
         )
         self._submit(job, self._learned)
 
@@ -273,14 +273,14 @@ class FollowPage(QWidget):
 
     # display
 
-    def _show(self, followed: Followed) -> None:
+    def _show(self, followed: TrackingState) -> None:
         self._followed = followed
         tracking = followed.tracking
         outcome = tracking.outcome(followed.request.address)
         self.headline.setText(track_headline(outcome))
         notes = () if not tracking.runs else tracking.runs[-1].notes
         self.next_run.show_pieces(
-            self._next_words(followed),
+            self._next_texts(followed),
             tuple(readable(f"{said}.") for said in (*tracking.warnings, *notes)),
         )
         self.runs.show_table(runs_table(outcome))
@@ -292,7 +292,7 @@ class FollowPage(QWidget):
         self._draw()
         self._refresh()
 
-    def _next_words(self, followed: Followed) -> list[str | Table]:
+    def _next_texts(self, followed: TrackingState) -> list[str | Table]:
         proposed, missed = followed.tracking.proposed, followed.tracking.inversion.unreachable
         pieces: list[str | Table] = []
         if proposed is not None:
@@ -343,7 +343,7 @@ class FollowPage(QWidget):
             self._job is None and followed is not None and bool(followed.tracking.runs)
         )
 
-    def _state(self, followed: Followed, changed: bool) -> tuple[str, str]:
+    def _state(self, followed: TrackingState, changed: bool) -> tuple[str, str]:
         """Return what keeps the next run from being shown on the page Run, and its role."""
         if changed:
             return "Target, model or rig have changed: compute the voltage again.", "warn"

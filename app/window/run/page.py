@@ -17,7 +17,7 @@ from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rigs import is_simulated
 from dearig.analysis.hold import HoldPlan
-from dearig.drivers.daqmx.watchdog import watchdog_words
+from dearig.drivers.daqmx.watchdog import watchdog_text
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.high_voltage.status import Reading
@@ -185,7 +185,7 @@ class RunPage(QWidget):
             self.watchdog.show_text("")
             return
         card = session.rig_file.card
-        words = watchdog_words(card, simulated=None)
+        words = watchdog_text(card, simulated=None)
         if not (card.watchdog_s or card.i_have_no_watchdog):
             words += "; a run on a real card needs card.i_have_no_watchdog = true in the rig file"
         self.watchdog.show_text(f"Hardware watchdog: {words}", "" if card.watchdog_s else "warn")

@@ -12,7 +12,7 @@ from dearig.config.presets import PRESETS
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.window.documents.dialogs import choose_file, save_as
-from dearig.window.documents.questions import may_drop, replace_or_tell
+from dearig.window.documents.questions import confirm_discard, replace_or_tell
 from dearig.window.jobs.background import Background
 from dearig.window.kit.fields import in_words
 from dearig.window.kit.theme import SPACE
@@ -22,7 +22,7 @@ from dearig.window.sequence.editor import SequenceEditor
 from dearig.window.sequence.preview_panel import PreviewPanel
 from dearig.window.session.layout_state import remember
 from dearig.window.session.state import Preview, Session
-from dearig.window.session.text_file import Asked, Saved, TextFile
+from dearig.window.session.text_file import OverwriteQuestion, Saved, TextFile
 
 __all__ = ["SequencePage"]
 
@@ -91,14 +91,14 @@ class SequencePage(QWidget):
         """
         file, text = self.draft.file, self.draft.toml
 
-        def write() -> Saved | Asked:
+        def write() -> Saved | OverwriteQuestion:
             return file.write(path, text, replace)
 
         self._files.start(write)
 
     def may_replace(self) -> bool:
         """Return True if the sequence has no unsaved changes, or the operator gives them up."""
-        return may_drop(self, self.session, self.draft.file, self.draft.toml)
+        return confirm_discard(self, self.session, self.draft.file, self.draft.toml)
 
     def take(self, toml: str) -> bool:
         """Replace the sequence by ``toml`` of another page; False where the operator refuses."""
@@ -137,8 +137,8 @@ class SequencePage(QWidget):
         self._files.close()
 
     @Slot(object)
-    def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
-        if isinstance(answer, Asked):
+    def _file_done(self, answer: tuple[Path, str] | Saved | OverwriteQuestion) -> None:
+        if isinstance(answer, OverwriteQuestion):
             replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
             return
         if isinstance(answer, Saved):

@@ -12,7 +12,7 @@ from pytestqt.qtbot import QtBot
 
 from dearig.config.presets import PRESETS
 from dearig.window.documents.dialogs import ask
-from dearig.window.documents.questions import may_drop
+from dearig.window.documents.questions import confirm_discard
 from dearig.window.kit.theme import LIGHT
 from dearig.window.session.recovery import Recovery
 from dearig.window.session.state import Session
@@ -111,7 +111,7 @@ def test_the_default_of_a_question_loses_nothing(
         qtbot.keyClick(box, Qt.Key.Key_Return)
 
     QTimer.singleShot(0, press)
-    assert not may_drop(page, window.session, page.draft.file, page.draft.toml)
+    assert not confirm_discard(page, window.session, page.draft.file, page.draft.toml)
     assert pressed == ["Cancel"]
     monkeypatch.setattr("dearig.window.documents.questions.ask", answers)
     answers.next = True

@@ -1,4 +1,4 @@
-"""The load's inertia, drag and friction, and what is in no family, by the second hand.
+"""The load's inertia, drag and friction, and what is in no family, by generator B.
 
 Inertia. ``lever``: the load moves a lever, so that the moving mass changes with the travel
 (Lagrange's equation: M x'' + M' x'^2/2). ``pulley``: a pulley's inertia J/r^2 adds to the mass.

@@ -1,4 +1,4 @@
-"""Amplifier, electrode and leakage, by the second hand.
+"""Amplifier, electrode and leakage, by generator B.
 
 Amplifier. ``tanh_stage``: V_0 tanh(v/V_0), a differential pair (Gray and Meyer, Analysis and Design
 of Analog Integrated Circuits, 1977). ``slewing_pair``: dv_o/dt = S tanh((v - v_o)/(S tau)), the

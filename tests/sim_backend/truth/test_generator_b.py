@@ -1,4 +1,4 @@
-"""The second hand's laws against the formulas of their sources."""
+"""Generator B's laws against the formulas of their sources."""
 
 import math
 
@@ -8,13 +8,13 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.sim_backend.truth import generator_b_laws
 from dearig.sim_backend.truth import kernels as loops
-from dearig.sim_backend.truth import second_laws
 from dearig.sim_backend.truth.film import FilmNumbers, rest_stretch
+from dearig.sim_backend.truth.generator_b import dielectric, electric, film, load, sensor
+from dearig.sim_backend.truth.generator_b.spectrum import asymmetric, stretched_exponential
+from dearig.sim_backend.truth.generator_b_laws import Second
 from dearig.sim_backend.truth.plant import TruthPlant
-from dearig.sim_backend.truth.second_hand import dielectric, electric, film, load, sensor
-from dearig.sim_backend.truth.second_hand.spectrum import asymmetric, stretched_exponential
-from dearig.sim_backend.truth.second_laws import Second
 
 NUMBERS = FilmNumbers.of(THESIS_FILM, THESIS_LOAD, TABLE_3)
 REST = rest_stretch(NUMBERS)
@@ -30,19 +30,19 @@ def law(form, seed=0):
 
 def stress(s, lam=REST, rate=0.0, state=(0.0, 0.0, 0.0)):
     """Stress in Pa against the motion, and the slopes of the states."""
-    slopes = np.full(second_laws.STATES, np.nan)
-    found = second_laws.added_stress(s, np.array(state), 0, lam, rate, REST, slopes)
+    slopes = np.full(generator_b_laws.STATES, np.nan)
+    found = generator_b_laws.added_stress(s, np.array(state), 0, lam, rate, REST, slopes)
     return found, slopes
 
 
 def test_nothing_is_added_without_a_law():
-    found, slopes = stress(second_laws.NOTHING, REST + 0.01, 0.1)
+    found, slopes = stress(generator_b_laws.NOTHING, REST + 0.01, 0.1)
     assert found == 0.0
     assert not slopes.any()
-    assert second_laws.wholeness(second_laws.NOTHING, 1.4, REST, REST) == 1.0
-    assert second_laws.healed(second_laws.NOTHING, 1.4, REST, 9.0) == 1.4
-    assert second_laws.permittivity_factor(second_laws.NOTHING, 64e6, 1.3, REST) == 1.0
-    assert second_laws.fastest_decay(second_laws.NOTHING, 0.5) == 0.0
+    assert generator_b_laws.wholeness(generator_b_laws.NOTHING, 1.4, REST, REST) == 1.0
+    assert generator_b_laws.healed(generator_b_laws.NOTHING, 1.4, REST, 9.0) == 1.4
+    assert generator_b_laws.permittivity_factor(generator_b_laws.NOTHING, 64e6, 1.3, REST) == 1.0
+    assert generator_b_laws.fastest_decay(generator_b_laws.NOTHING, 0.5) == 0.0
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -69,7 +69,7 @@ def test_what_is_drawn_is_what_a_steady_pull_gives():
     # the element bears the drawn stress at a hundredth of the limiting rate
     s, rate = law(film.bodner_partom, 3), 0.01 * law(film.bodner_partom, 3).flow_limit
     steady = solve_ivp(
-        lambda _, y: [rate - second_laws._flow(s, s.flow_spring * y[0])],
+        lambda _, y: [rate - generator_b_laws._flow(s, s.flow_spring * y[0])],
         (0.0, 20.0 * s.flow_yield / s.flow_spring / rate),
         [0.0],
         "Radau",
@@ -120,32 +120,34 @@ def test_the_loops_centre_line_is_where_no_loop_is_left():
 def test_softening_is_by_the_largest_energy_and_heals():
     s = law(film.ogden_roxburgh)
     lam, farthest = REST + 0.01, REST + 0.025
-    energy = second_laws._strain(farthest) - second_laws._strain(lam)
+    energy = generator_b_laws._strain(farthest) - generator_b_laws._strain(lam)
     assert energy == pytest.approx(0.5 * (farthest**2 + farthest**-2 - lam**2 - lam**-2))
-    whole = second_laws.wholeness(s, farthest, lam, REST)
+    whole = generator_b_laws.wholeness(s, farthest, lam, REST)
     assert whole == pytest.approx(1.0 - s.roxburgh * math.erf(energy / s.roxburgh_width))
-    left = second_laws.healed(s, farthest, lam, 0.5 * s.heal_time) - lam
+    left = generator_b_laws.healed(s, farthest, lam, 0.5 * s.heal_time) - lam
     assert left == pytest.approx(0.015 * math.exp(-0.5))
-    assert second_laws.healed(s, lam, farthest, 1.0) == farthest
+    assert generator_b_laws.healed(s, lam, farthest, 1.0) == farthest
     s = law(film.simo)
-    energy = second_laws._strain(farthest) - second_laws._strain(REST)
-    whole = second_laws.wholeness(s, farthest, REST, REST)
+    energy = generator_b_laws._strain(farthest) - generator_b_laws._strain(REST)
+    whole = generator_b_laws.wholeness(s, farthest, REST, REST)
     assert whole == pytest.approx(1.0 - s.simo * (1.0 - math.exp(-energy / s.simo_strain)))
 
 
 def test_permittivities_are_their_formulas():
     square, lam = 7e3**2, 1.22
     s = law(dielectric.johnson)
-    found = second_laws.permittivity_factor(s, square, lam, REST)
+    found = generator_b_laws.permittivity_factor(s, square, lam, REST)
     assert found == pytest.approx((1.0 + 3.0 * s.johnson * square * lam**2) ** (-1.0 / 3.0))
     s = law(dielectric.booth)
     u = math.sqrt(square * lam**2 / s.booth_square)
     langevin = 1.0 / math.tanh(u) - 1.0 / u
-    found = second_laws.permittivity_factor(s, square, lam, REST)
+    found = generator_b_laws.permittivity_factor(s, square, lam, REST)
     assert found == pytest.approx(1.0 - s.booth * (1.0 - 3.0 * langevin / u))
     # no jump where the series takes over
     edge = 1e-4 * s.booth_square / lam**2
-    below, above = (second_laws.permittivity_factor(s, edge * f, lam, REST) for f in (0.999, 1.001))
+    below, above = (
+        generator_b_laws.permittivity_factor(s, edge * f, lam, REST) for f in (0.999, 1.001)
+    )
     assert above == pytest.approx(below, abs=1e-7)
 
 
@@ -254,15 +256,15 @@ def test_trapped_charge_leaks_ohmically_and_then_by_a_power():
     hidden = drawn(electric.trap_filled).on_film(NUMBERS).hidden
     s = hidden.further
     for v in (1e-2 * s.trap_voltage, s.trap_voltage, 3.0 * s.trap_voltage):
-        current, slope = second_laws.trap_leak(s, hidden.leak_conductance, v, 1.0)
+        current, slope = generator_b_laws.trap_leak(s, hidden.leak_conductance, v, 1.0)
         expected = hidden.leak_conductance * v * (1.0 + (v / s.trap_voltage) ** s.trap_exponent)
         assert current == pytest.approx(expected)
-        nearby, _ = second_laws.trap_leak(s, hidden.leak_conductance, 1.0001 * v, 1.0)
+        nearby, _ = generator_b_laws.trap_leak(s, hidden.leak_conductance, 1.0001 * v, 1.0)
         assert slope == pytest.approx((nearby - current) / (1e-4 * v), rel=1e-3)
 
 
 def test_defaults_of_a_law_are_none():
-    assert Second() == second_laws.NOTHING
-    assert NUMBERS.at_rest(REST).y.size + second_laws.STATES == (
+    assert Second() == generator_b_laws.NOTHING
+    assert NUMBERS.at_rest(REST).y.size + generator_b_laws.STATES == (
         NUMBERS.obeying(naumann=1.0).at_rest(REST).y.size
     )

@@ -1,7 +1,7 @@
-"""Constitutive laws of the second hand: compiled terms of the film's equation of motion.
+"""Constitutive laws of generator B: compiled terms of the film's equation of motion.
 
-These forms are published elsewhere and are in neither ``dearig.model.effects`` nor the first hand.
-The files of ``second_hand`` draw their numbers and give the sources. ``film`` calls the functions
+These forms are published elsewhere and are in neither ``dearig.model.effects`` nor generator A.
+The files of ``generator_b`` draw their numbers and give the sources. ``film`` calls the functions
 here at the places where they act.
 """
 
@@ -30,7 +30,7 @@ __all__ = [
 
 
 class Second(NamedTuple):
-    """Parameters of the second hand's laws; the defaults have no influence.
+    """Parameters of generator B's laws; the defaults have no influence.
 
     Lengths are given as stretches (of L1), forces as nominal stresses.
     """

@@ -1,4 +1,4 @@
-"""The film's stress, by the second hand: creep, softening, loops, yielding and warming.
+"""The film's stress, by generator B: creep, softening, loops, yielding and warming.
 
 Creep. ``kohlrausch``: a relaxation modulus exp(-(t/T)^b) in slow branches. ``bergstrom_boyce``: one
 branch that flows with a power of its stress and with the inelastic stretch (Bergstrom and Boyce, J.
@@ -31,8 +31,8 @@ import numpy as np
 from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import COURSE_HEATING, COURSE_STIFFNESS, FilmNumbers
+from dearig.sim_backend.truth.generator_b.spectrum import stretched_exponential
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform
-from dearig.sim_backend.truth.second_hand.spectrum import stretched_exponential
 
 __all__ = [
     "bergstrom_boyce",

@@ -1,4 +1,4 @@
-"""Permittivity and its relaxation, by the second hand.
+"""Permittivity and its relaxation, by generator B.
 
 Relaxation. ``kohlrausch``: the polarisation follows a step as 1 - exp(-(t/T)^b) (Kohlrausch 1854;
 Williams and Watts, Trans. Faraday Soc. 66, 1970). ``havriliak_negami``: the spectrum of 1/(1 +
@@ -19,9 +19,9 @@ import numpy as np
 from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers
+from dearig.sim_backend.truth.generator_b.spectrum import asymmetric, stretched_exponential
 from dearig.sim_backend.truth.plumbing import relaxing
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform
-from dearig.sim_backend.truth.second_hand.spectrum import asymmetric, stretched_exponential
 
 __all__ = ["booth", "havriliak_negami", "johnson", "kohlrausch", "peaked"]
 

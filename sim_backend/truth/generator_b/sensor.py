@@ -1,4 +1,4 @@
-"""The sensor and its surroundings, by the second hand.
+"""The sensor and its surroundings, by generator B.
 
 Lag. ``delay``: the reading is the position some time ago, as of a digital controller with a
 pipeline. ``butterworth``: y'' + sqrt(2) w y' + w^2 (y - x) = 0 (Butterworth, Wireless Engineer 7,
