@@ -17,7 +17,7 @@ from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
     SeparatingExperiment,
-    Stand,
+    Evaluation,
     covariance_table,
     pooled_rms,
 )
@@ -31,8 +31,8 @@ from dearig.analysis.readings.compatibility import (
 )
 from dearig.analysis.readings.enough import check_enough, extrapolated, few_data
 from dearig.analysis.readings.opening import Source, check_named_once
-from dearig.analysis.readings.record import Readings, noise_sentences, read_all, recordings_of
-from dearig.analysis.readings.room import air_sentences_of, room_sentences
+from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
+from dearig.analysis.readings.room import air_texts_of, room_texts
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence, parse_sequence
@@ -305,9 +305,9 @@ def _prepared(
     for readings in fitted:
         readings.check_driven()
     said = [f"{each.name}: {sentence}" for each in every for sentence in each.quality.findings]
-    said += noise_sentences(every)
-    said += room_sentences(recordings_of(every))
-    said += air_sentences_of(recordings)
+    said += noise_texts(every)
+    said += room_texts(recordings_of(every))
+    said += air_texts_of(recordings)
     said += extrapolated(fitted, others)
     films = sorted({r.film_id for r in recordings_of(every) if r.film_id})
     if len(films) > 1:
@@ -360,7 +360,7 @@ def _outcome(
     if not finding.steps:
         models = [finding.baseline, finding.final]
     stands = tuple(
-        Stand(
+        Evaluation(
             tuple(name for name, _ in stage.model.effects),
             _compared(fitted, stage.of_each(len(fitted)), "train", failed),
             _compared(others, [stage.predicting] * len(others), "validation", failed),
@@ -463,7 +463,7 @@ def _own(readings: Sequence[Readings], model: Any, may_drift: bool) -> dict[str,
     return {name: of(name) for name in records}
 
 
-def _without_own(stand: Stand, own: dict[str, Own | None]) -> Stand:
+def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
     """Return ``stand`` with each recording's events, and what they leave of untouched ones."""
 
     def of(comparison: Comparison) -> Comparison:
@@ -512,7 +512,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
     def rms(comparisons: Sequence[Comparison]) -> float | None:
         return pooled_rms(comparisons) * shown.error_factor if comparisons else None
 
-    def errors(stand: Stand) -> dict[str, Any]:
+    def errors(stand: Evaluation) -> dict[str, Any]:
         return {
             f"train_rms_{shown.suffix}": rms(stand.train),
             f"validation_rms_{shown.suffix}": rms(stand.validation),

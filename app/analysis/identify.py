@@ -30,8 +30,8 @@ from dearig.analysis.readings.compatibility import (
 )
 from dearig.analysis.readings.enough import few_data
 from dearig.analysis.readings.opening import Source, check_named_once
-from dearig.analysis.readings.record import Readings, noise_sentences, read_all, recordings_of
-from dearig.analysis.readings.room import room_sentences
+from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
+from dearig.analysis.readings.room import room_texts
 from dearig.analysis.thesis_runs import PUBLISHED_FIT
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -150,8 +150,8 @@ def identify_recordings(
         quality=(
             *left_out,
             *also_left_out,
-            *noise_sentences((*fitted, *others)),
-            *room_sentences(recordings_of((*fitted, *others))),
+            *noise_texts((*fitted, *others)),
+            *room_texts(recordings_of((*fitted, *others))),
         ),
         few_data=few_data(fitted),
         assumed=assumed_by(recordings, rig_file),

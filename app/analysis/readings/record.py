@@ -15,14 +15,14 @@ from dearig.analysis.readings.quality import Quality, check_driven, driven_by, i
 from dearig.analysis.readings.room import moisture_of, warmth_of
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.readings.denoise import quieted, reading_noise
+from dearig.model.readings.denoise import smoothed, reading_noise
 from dearig.model.readings.noise import LEAD_IN, require_readings, rest_of_rounded, slow_at_rest
-from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, bridged
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, interpolated
 from dearig.model.simulation.actuator import Drive
 from dearig.recording.content.rest_noise import MIN_QUIET, ReadingNoise
 from dearig.recording.reading.recording import Recording
 
-__all__ = ["Readings", "noise_sentences", "read_all", "recordings_of"]
+__all__ = ["Readings", "noise_texts", "read_all", "recordings_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ class Readings:
             volts = _present(voltage)
             noise = reading_noise(volts)
             if noise > 0.0:
-                volts = quieted(volts, noise)
+                volts = smoothed(volts, noise)
             hold = self.is_held or recording.hold
             return Drive(recording.time, volts, hold, warmth, moisture, temperature, humidity)
         except ModelError as error:
@@ -154,14 +154,14 @@ class Readings:
             _known(recording, recording.noise)  # refuses one that never changes
             self.check_driven()
             valid, noise = self.quality.valid, self.known_noise()
-            stress = bridged(recording.time, stress, valid)
+            stress = interpolated(recording.time, stress, valid)
             return FilmRecord(recording.name, recording.time, stretch, stress, noise.value, valid)
         displacement = self.displacement
         _known(recording, recording.noise)
         driven = self.voltage
         self.check_driven()
         valid, noise = self.quality.valid, self.known_noise()
-        displacement = bridged(recording.time, displacement, valid)
+        displacement = interpolated(recording.time, displacement, valid)
         if noise.step:
             valid = ~recording.quiet if valid is None else valid & ~recording.quiet
         return ActuatorRecord(
@@ -201,7 +201,7 @@ def recordings_of(readings: Iterable[Readings]) -> list[Recording]:
     return [each.recording for each in readings]
 
 
-def noise_sentences(readings: Iterable[Readings]) -> list[str]:
+def noise_texts(readings: Iterable[Readings]) -> list[str]:
     """Return a sentence on each recording of an actuator whose noise is not simply that at rest.
 
     It is from no lead-in, or something moves there.

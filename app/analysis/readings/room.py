@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import scipy  # loads its parts when they are first used, which a run may never do
 
-from dearig.model.readings.environment import CELSIUS, HUMIDITY, air_sentences
+from dearig.model.readings.environment import CELSIUS, HUMIDITY, air_texts
 from dearig.recording.reading.recording import Recording
 
-__all__ = ["air_sentences_of", "moisture_of", "room_sentences", "warmth_of"]
+__all__ = ["air_texts_of", "moisture_of", "room_texts", "warmth_of"]
 
 _THERMOMETER = 1.0  # s over which a temperature is averaged: films do not warm faster
 
@@ -48,7 +48,7 @@ def _air(
     return scale * changes, scale * first - reference
 
 
-def room_sentences(recordings: Sequence[Recording]) -> list[str]:
+def room_texts(recordings: Sequence[Recording]) -> list[str]:
     """Return a sentence with the means of temperature and humidity; none where not recorded."""
     parts = []
     for name, unit in (("temperature_degC", "°C"), ("relative_humidity_percent", "%")):
@@ -59,11 +59,11 @@ def room_sentences(recordings: Sequence[Recording]) -> list[str]:
     return [f"the room was at {', '.join(parts)} (means of the recordings)"] if parts else []
 
 
-def air_sentences_of(recordings: Sequence[Recording]) -> list[str]:
+def air_texts_of(recordings: Sequence[Recording]) -> list[str]:
     """Return why what films owe to the recorded air of the room cannot be looked for."""
     driven = [r for r in recordings if r.kind == "actuator"]
     return list(
-        air_sentences(
+        air_texts(
             [warmth_of(r)[1] for r in driven],
             [moisture_of(r)[1] for r in driven],
         )
