@@ -15,7 +15,7 @@ from dearig.analysis.readings.quality import Quality, check_driven, driven_by, i
 from dearig.analysis.readings.room import moisture_of, warmth_of
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.readings.denoise import smoothed, reading_noise
+from dearig.model.readings.denoise import reading_noise, smoothed
 from dearig.model.readings.noise import LEAD_IN, require_readings, rest_of_rounded, slow_at_rest
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, interpolated
 from dearig.model.simulation.actuator import Drive
