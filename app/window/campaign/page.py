@@ -8,9 +8,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from PySide6.QtCore import Qt, QTimer, Signal, Slot
+from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
@@ -46,8 +46,10 @@ from dearig.window.jobs.worker import Worker
 from dearig.window.kit.browser import open_in_browser
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label
+from dearig.window.run.page import RunPage
 from dearig.window.run.runner import Play, RunEnd, Runner
 from dearig.window.session.layout_state import remember
+from dearig.window.session.page import Page, Pages
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import TextFile
 
@@ -63,18 +65,15 @@ _NEXT = "the next run starts by itself"
 _PAUSED = "the campaign is paused"
 
 
-class CampaignPage(QWidget):
-    """Plans, arms and plays campaigns with ``runner``, and continues them.
-
-    ``show_recording`` carries a recording to look at.
-    """
+class CampaignPage(Page):
+    """Plans, arms and plays campaigns with ``runner``, and continues them."""
 
     title = "Campaign"
-    shortcut = "Ctrl+7"
-    show_recording = Signal(Path)
+    at_start = True
+    edits = "plan"
 
     def __init__(self, session: Session, runner: Runner, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self._session = session
         self._runner = runner
         self.faults: FaultPlan | None = None  #: faults of the next simulated campaign
@@ -108,6 +107,15 @@ class CampaignPage(QWidget):
         self._numbers.timeout.connect(self._update_numbers)
         self._connect()
         self._refresh()
+
+    @classmethod
+    def make(cls, session: Session, pages: Pages) -> Self:
+        """Return the page; it plays with the runner of the page Run."""
+        return cls(session, pages.page(RunPage).runner)
+
+    def restore(self, text: str, file: TextFile) -> None:
+        """Replace the plan by the unsaved one of an earlier window."""
+        self.plan.restore(text, file)
 
     # what the page offers
 

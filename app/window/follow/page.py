@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtWidgets import (
@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from dearig.analysis.track_target import WITHIN
 from dearig.analysis.tracking import TrackedRun
+from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.recording.result_folder import numbered_folder
 from dearig.report.pages.track import (
@@ -51,8 +52,11 @@ from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.report_table import ReportTable
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label
+from dearig.window.run.page import RunPage
 from dearig.window.session.layout_state import remember
+from dearig.window.session.page import Page, Pages
 from dearig.window.session.state import Session
+from dearig.window.session.text_file import TextFile
 
 __all__ = ["FollowPage"]
 
@@ -61,23 +65,20 @@ _COLUMNS = [520, 340]  # px, of the words and of the error from run to run
 _WITHIN_MAX = 1000.0  # um
 
 
-class FollowPage(QWidget):
+class FollowPage(Page):
     """Proposes the runs of a target one after another, and learns from their recordings.
 
-    ``play_sequence`` carries a sequence file for the page Run; ``use_model`` the model file to
-    overlay there; ``waits`` is True while the run of a shown sequence is awaited.
+    ``waits`` is True while the run of a shown sequence is awaited.
     """
 
     title = "Follow"
-    shortcut = "Ctrl+6"
-    play_sequence = Signal(Path)
-    use_model = Signal(Path)
+    edits = "target"
     waits = Signal(bool)
 
     def __init__(
         self, session: Session, parent: QWidget | None = None, worker: Worker | None = None
     ) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self._session = session
         self._worker = worker or Worker(self)
         self._job: Job | None = None
@@ -91,6 +92,7 @@ class FollowPage(QWidget):
         )
         self.hold = HoldPanel(session, self._worker)
         self.hold.use_model.connect(self.use_model)
+        self.hold.play_hold.connect(self.play_hold)
         self.hold.waits.connect(self.waits)
         self.modes = QTabWidget()
         self.modes.setDocumentMode(True)
@@ -111,6 +113,19 @@ class FollowPage(QWidget):
         session.running_changed.connect(self._refresh)
         session.recorded.connect(self._recorded)
         self._refresh()
+
+    @classmethod
+    def make(cls, session: Session, pages: Pages) -> Self:
+        """Return the page; it observes the runs of the page Run."""
+        page, run = cls(session), pages.page(RunPage)
+        run.started.connect(page.hold.watch)
+        run.runner.ended.connect(page.hold.run_ended)
+        page.waits.connect(run.follow_button.setVisible)
+        return page
+
+    def restore(self, text: str, file: TextFile) -> None:
+        """Replace the target by the unsaved one of an earlier window."""
+        self.target.restore(text, file)
 
     # what the page offers
 
@@ -260,7 +275,12 @@ class FollowPage(QWidget):
         model = None if self._followed is None else self._followed.request.model
         if model is not None:
             self.use_model.emit(model)
-        self.play_sequence.emit(path)
+        try:
+            toml = read_text(path, "sequence")
+        except InputError as error:
+            self.message.show_text(str(error))
+            return
+        self.play_sequence.emit(toml, path)
 
     def _best(self) -> TrackedRun | None:
         if self._followed is None:

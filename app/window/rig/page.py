@@ -40,6 +40,7 @@ from dearig.window.kit.fields import form_fields, in_words
 from dearig.window.kit.form import Form
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
+from dearig.window.session.page import Page
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import OverwriteQuestion, Saved, TextFile
 
@@ -51,14 +52,15 @@ _BLOCK, _ADDRESS_BLOCK = "rig file", "rig address"  # keys of what blocks arming
 _KINDS = ("sim", "hidden", "local", "remote")
 
 
-class RigPage(QWidget):
+class RigPage(Page):
     """Chooses and checks the rig, and edits the rig file with faults beside their fields."""
 
     title = "Rig"
-    shortcut = "Ctrl+1"
+    at_start = True
+    edits = "rig file"
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self.session = session
         self.text = session.rig_text
         self._in_force = session.rig_text  # the last text without faults

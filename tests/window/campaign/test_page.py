@@ -320,7 +320,7 @@ def test_what_is_computed_after_a_run_is_ended_by_stop_and_its_faults_are_noted(
 def test_the_window_closes_in_a_campaign_at_zero_and_the_journal_goes_on(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:
-    page, runner = window.campaign_page, window.run_page.runner
+    page, runner = window.page(CampaignPage), window.run_page.runner
     window.session.set_rig_file(None, "", RIG)
     (tmp_path / "lobe.toml").write_text(LONG, "utf-8")
     write(page, PLAN, tmp_path)
