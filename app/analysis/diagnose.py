@@ -56,7 +56,7 @@ from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
-from dearig.model.fitting.prediction import prediction_error
+from dearig.model.fitting.prediction import prediction_error, prediction_gain
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.verdict import NOTHING_MISSING
@@ -418,7 +418,11 @@ def _outcome(
         prediction_errors=_prediction_errors(
             [r for r in others if r.name in compared], finding, drive
         ),
+        gain=_gain(stands, own, noise) if finding.steps else None,
     )
+    if not outcome.recommends_final:
+        plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)
+        outcome = replace(outcome, model=plain)
     history = _history(outcome, recordings)
     return replace(outcome, model=replace(outcome.model, history=history))
 
@@ -495,6 +499,29 @@ def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
     )
 
 
+def _gain(stands: Sequence[Evaluation], own: dict[str, Own | None], noise: float) -> float | None:
+    """Return twice the log of the odds that validation gives to the final model, over the first.
+
+    None where nothing validates it, minus infinity where it cannot follow what the first one can.
+    """
+    last = {c.name: c for c in stands[-1].validation}
+    first = stands[0].validation
+    if any(c.name not in last for c in first):
+        return -math.inf
+    gains = []
+    for one in first:
+        two, found = last[one.name], own.get(one.name)
+        alone = found.signal if found is not None and found.signal.size == one.time.size else 0.0
+        gains.append(
+            prediction_gain(
+                one.measured - one.model - alone,
+                two.measured - two.model - alone,
+                one.noise or noise,
+            )
+        )
+    return sum(gains) if gains else None
+
+
 def _noise(recordings: Sequence[Recording], drive: str) -> float:
     """Return the noise of the training recordings, RMS over all samples, m or Pa."""
     records = [as_record(r, drive) for r in recordings]
@@ -523,6 +550,7 @@ def _experiment(
 def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[str, Any]:
     """Return the origin of the model, for its file."""
     finding, stands = outcome.finding, outcome.stands
+    stage = finding.final if outcome.recommends_final else finding.baseline
     shown = SHOWN[outcome.kind]
 
     def rms(comparisons: Sequence[Comparison]) -> float | None:
@@ -542,7 +570,8 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
         "verdict": outcome.verdict,
         "status": outcome.status,
         "interrupted": finding.interrupted,
-        "mean_square_over_noise": finding.final.cost,
+        "recommended": "final" if outcome.recommends_final else "baseline",
+        "mean_square_over_noise": stage.cost,
         f"noise_floor_{shown.suffix}": outcome.noise * shown.error_factor,
         "notes": [*finding.notes, *outcome.quality],
         "before": errors(stands[0]),
@@ -557,7 +586,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
                 "indistinguishable_from": list(s.indistinguishable_from),
                 "evidence": list(s.evidence),
             }
-            for s in finding.steps
+            for s in (finding.steps if outcome.recommends_final else ())
         ],
         "estimate": [
             {
@@ -570,7 +599,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
                 "at_bound": e.at_bound,
                 "note": e.note,
             }
-            for e in finding.final.estimates
+            for e in stage.estimates
         ],
-        "covariance": covariance_table(finding.final.covariance_names, finding.final.covariance),
+        "covariance": covariance_table(stage.covariance_names, stage.covariance),
     }
