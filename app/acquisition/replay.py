@@ -47,7 +47,8 @@ class Original:
         if (self.film, self.load) != (rig_file.as_film(), rig_file.as_load()):
             raise InputError(
                 f"{self.path} was made with the film and load of a model file, which differ from "
-                f"those of its rig file: give the model file with --model"
+                f"those of its rig file: give the model file too",
+                option="model",
             )
 
 
@@ -65,7 +66,8 @@ def original_of(path: str | Path) -> Original:
     if "feedback" in noted:
         raise InputError(
             f"{path} was corrected while it was recorded: its voltage followed the readings, and "
-            f"its sequence alone does not repeat it; use dearig hold again"
+            f"its sequence alone does not repeat it; hold the displacement again",
+            command=("hold",),
         )
     configuration = str(noted.get("configuration", ""))
     name = f"the rig file in {path}"

@@ -268,7 +268,8 @@ def table_of(path: Path) -> Path:
     found = path / "study.csv"
     if not found.is_file():
         raise InputError(
-            f"{path} has no study.csv: give the folder of a study (dearig study), or its table"
+            f"{path} has no study.csv: give the folder of a study, or its table",
+            command=("study",),
         )
     return found
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dearig.cli.hints import with_hints
 from dearig.cli.options import (
     FilmName,
     Force,
@@ -260,7 +261,7 @@ def _verify(path: Path, json: str | None) -> None:
     for what in found.checked:
         print_line(console, f"checked: {what}")
     for note in found.notes:
-        print_line(console, f"note: {note}", style="yellow")
+        print_line(console, f"note: {with_hints(note)}", style="yellow")
     for fault in found.faults:
         print_line(console, f"WRONG: {fault}", style="red")
     print_line(

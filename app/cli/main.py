@@ -26,6 +26,7 @@ from typer.exceptions import TyperException
 
 from dearig import log_file
 from dearig.cli import campaign, files, fit, hold, run, study, tools, track, trends, watch
+from dearig.cli.hints import with_hints
 from dearig.cli.last_words import LastingStream, leave, silence_libraries
 from dearig.cli.lost_interrupt import note_lost
 from dearig.cli.options import without_secrets
@@ -197,7 +198,7 @@ def _run(written: log_file.LogFile) -> int:
     except DearigError as error:
         if isinstance(error.__cause__, BrokenPipeError):
             return _reader_left()
-        _say(str(error))
+        _say(with_hints(error))
         return error.exit_code
     except TyperException as error:
         _say(_usage(error))

@@ -102,10 +102,10 @@ def open_recordings(
     The warning comes before they are used as they are.
     """
     from dearig.analysis.readings.early_ends import early_end_warnings
-    from dearig.analysis.readings.opening import open_all
+    from dearig.recording.reading.reader import open_recording
 
-    fitted, others = open_all(train), open_all(validation)
-    found = early_end_warnings([*fitted, *others]) if ended_early == "keep" else ()
+    opened = {path: open_recording(path) for path in (*train, *validation)}
+    found = early_end_warnings([*opened.values()]) if ended_early == "keep" else ()
     if found:
         print_lines(console, [f"Warning: {said}" for said in found], "yellow")
         print_line(
@@ -113,7 +113,7 @@ def open_recordings(
             "Use --ended-early cut to leave out such an end, or --ended-early leave-out to leave "
             "out the recording.",
         )
-    return fitted, others
+    return [opened[path] for path in train], [opened[path] for path in validation]
 
 
 @contextmanager

@@ -52,9 +52,7 @@ TEXT_MAX = 2**27
 
 #: A plan that the rig of the thesis can play.
 EXAMPLE = """\
-# A campaign: many runs, one after the other, without a person beside them. Edit it, then
-#   dearig campaign FILE.toml --rig sim --out DIR --check    (says how long it takes; plays nothing)
-#   dearig campaign FILE.toml --rig sim --out DIR
+# A campaign: many runs, one after the other, without a person beside them.
 name = "ageing"
 sequence = "validation-b-6.0"   # a preset, or a sequence file beside this one
 repeat = 2                      # times that each setting is played

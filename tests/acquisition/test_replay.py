@@ -53,7 +53,7 @@ def test_a_run_of_a_model_file_needs_it_again(tmp_path: Path) -> None:
     assert dearig(*record).code == 0
     refused = dearig("record", "--like", first, "--out", again)
     assert refused.code == 2
-    assert "give the model file with --model" in refused.err
+    assert "give the model file too (--model)" in refused.err
     done("record", "--like", first, "--model", model, "--out", again)
     assert same(first, again)
 

@@ -76,8 +76,9 @@ def print_report(report: str | Path, out: str | Path, overwrite: bool = False) -
         raise InputError(f"the report {report} cannot be read: {words}") from error
     if _MARK not in page[:2000]:
         raise InputError(
-            f"{report} is no report of this program; give a file that --report wrote, such as "
-            f"report.html"
+            f"{report} is no report of this program; give the page of a fit or a diagnosis, such "
+            f"as report.html",
+            option="report",
         )
     return write_pdf(page, out, overwrite)
 

@@ -136,7 +136,7 @@ class Clients:
             if self._device.drives(name):
                 self._make_safe(
                     name,
-                    f"it was silent for more than {self._timeout:g} s (--client-timeout) with a "
+                    f"it was silent for more than {self._timeout:g} s, the time limit of clients, with a "
                     f"voltage at the film",
                 )
 
