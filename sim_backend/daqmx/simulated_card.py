@@ -276,8 +276,7 @@ class SimulatedCard(TriggeredDevice):
     def start(self, task: Task) -> None:
         """Start ``task``: at once, or to wait for its clock or trigger."""
         with self._lock:
-            if task.running:
-                return
+            self._not_running(task)
             if task.kind is Kind.DO and task.clock is not None:
                 self._check_watchdog(task)
                 self._may_generate(task)

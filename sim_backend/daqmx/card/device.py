@@ -234,8 +234,7 @@ class Device(TimingEngine):
         """Start ``task``: at once, or to wait for its clock or trigger."""
         with self._lock:
             now = self._settle()
-            if task.running:
-                return
+            self._not_running(task)
             self._verify(task)
             if task.kind is Kind.AO and task.clock is not None:
                 self._may_generate(task)

@@ -338,7 +338,7 @@ class TimingEngine(Setup):
         if task.watchdog is not None:
             task.watchdog.deadline = None
         if task.running:
-            task.state = task.kept
+            task.state, task.delivered = task.kept, 0
 
     def _done(self, task: Task, now: float) -> bool:
         if not task.running:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -25,6 +26,7 @@ from dearig.sim_backend.daqmx.card.tasks import (
     SampleClock,
     Task,
     Watchdog,
+    counted_on,
     expanded,
     physical_names,
 )
@@ -69,6 +71,8 @@ _ON_BOARD = "onboardclock"
 _MOST_SAMPLES = 2**32 - 1  # per channel, in a buffer
 _SLOWEST = 2**32  # ticks of the timebase between two samples
 _SETTLE_US = 10.0  # extra settling time that the driver gives an input where there is time
+#: A rate that is a whole division may be too high by the rounding of two divisions in doubles.
+_ROUNDED = 1.0 + 2.0 * sys.float_info.epsilon
 _FIRST_US = 0.25  # default delay from the sample clock to the first conversion
 #: Default input buffer of a continuous task: up to a rate in Hz, in samples.
 _BUFFERS = ((100.0, 1000), (10e3, 10_000), (1e6, 100_000), (math.inf, 1_000_000))
@@ -502,7 +506,12 @@ class Setup:
                 f"Property: SampClk.Rate; Requested Value: {rate:g}; Maximum Value: {most:g}; "
                 f"Minimum Value: {least:.6g}; Task Name: {task.name}",
             )
-        return rate if external else self._timebase / max(1, round(self._timebase / rate))
+        if external:
+            return rate
+        ticks = self._timebase / rate
+        # NI's driver truncates the divisor of an analog input and rounds the others
+        whole = math.floor(ticks * _ROUNDED) if task.kind is Kind.AI else round(ticks)
+        return self._timebase / max(whole, math.ceil(self._timebase / most / _ROUNDED))
 
     @property
     def _timebase(self) -> float:
@@ -571,7 +580,7 @@ class Setup:
         names = [f"{self.name}/{terminal}" for terminal in terminals]
         given = [n for part in name.split(",") for n in expanded(part.strip())] if name else []
         if len(given) == 1 and len(terminals) > 1:
-            names = [f"{name}{i}" for i in range(len(terminals))]
+            names = counted_on(given[0], len(terminals))
         elif given:
             names = given + names[len(given) :]
         taken = {called.lower() for called in task.channel_names}

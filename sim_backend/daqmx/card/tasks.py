@@ -46,6 +46,7 @@ __all__ = [
     "State",
     "Task",
     "Watchdog",
+    "counted_on",
     "expanded",
     "physical_names",
 ]
@@ -364,7 +365,10 @@ _LONGEST_RANGE = 64  # names
 
 
 def expanded(name: str) -> list[str]:
-    """Return the names in a range such as ``ai0:2`` or ``ai0:ai2``, or the name itself."""
+    """Return the names in a range such as ``ai0:2`` or ``ai0:ai2``, or the name itself.
+
+    Leading zeros of the first number give the width of all: ``in08:10`` is in08, in09, in10.
+    """
     found = _RANGE.match(name)
     if not found:
         return [name]
@@ -372,7 +376,21 @@ def expanded(name: str) -> list[str]:
     if abs(last - first) > _LONGEST_RANGE:
         raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {name}")
     step = 1 if last >= first else -1
-    return [f"{found[1]}{n}" for n in range(first, last + step, step)]
+    width = _width(found[2])
+    return [f"{found[1]}{n:0{width}d}" for n in range(first, last + step, step)]
+
+
+def _width(number: str) -> int:
+    """Return the width to which DAQmx fills the numbers of a range that begins at ``number``."""
+    return len(number) if number.startswith("0") and int(number) else 0
+
+
+def counted_on(name: str, count: int) -> list[str]:
+    """Return ``count`` names: DAQmx counts on from the number at the end of ``name``, or from 0."""
+    base = name.rstrip("0123456789")
+    number = name[len(base) :] or "0"
+    width, first = _width(number), int(number)
+    return [f"{base}{n:0{width}d}" for n in range(first, first + count)]
 
 
 def physical_names(text: str, device: str) -> list[str]:

@@ -339,8 +339,7 @@ class TriggeredDevice(Device):
     def start(self, task: Task) -> None:
         """Start ``task``: at once, or to wait for its clock or trigger."""
         with self._lock:
-            if task.running:
-                return
+            self._not_running(task)
             task.armed = self._settle()
             if task.reference is not None:
                 task.reference.rearm()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.tasks import (
     CURRENT_READ,
@@ -14,10 +16,12 @@ from dearig.sim_backend.daqmx.card.tasks import (
     WRITE_OFFSET,
     WRITE_RELATIVE_TO,
     Kind,
+    State,
     Watchdog,
 )
 from dearig.sim_backend.daqmx.properties.kinds import (
     Asked,
+    Getter,
     Property,
     accepted,
     changed,
@@ -86,6 +90,17 @@ def _set_read_available(asked: Asked, value: bool) -> None:
     asked.own.read_available = value
 
 
+def _at_work(position: Getter) -> Property:
+    """Return a property of the samples that passed, which only a reserved task has."""
+
+    def get(asked: Asked) -> Any:
+        if asked.own.state is State.VERIFIED:
+            raise DaqmxError(Code.ONLY_WHEN_RESERVED, asked.where)
+        return position(asked)
+
+    return given(get)
+
+
 READ: dict[str, Property] = {
     "CHANNELS_TO_READ": fixed(lambda a: ", ".join(a.own.channel_names), ""),
     "NUM_CHANS": given(lambda a: len(a.own.channel_names)),
@@ -93,9 +108,9 @@ READ: dict[str, Property] = {
         lambda a: max((len(channel.lines) for channel in a.own.lines), default=0)
     ),
     "RAW_DATA_WIDTH": given(lambda a: 2 * len(a.own.inputs)),
-    "AVAIL_SAMP_PER_CHAN": given(lambda a: a.device.available(a.own)),
-    "CURR_READ_POS": given(lambda a: a.own.delivered),
-    "TOTAL_SAMP_PER_CHAN_ACQUIRED": given(lambda a: a.device.acquired(a.own)),
+    "AVAIL_SAMP_PER_CHAN": _at_work(lambda a: a.device.available(a.own)),
+    "CURR_READ_POS": _at_work(lambda a: a.own.delivered),
+    "TOTAL_SAMP_PER_CHAN_ACQUIRED": _at_work(lambda a: a.device.acquired(a.own)),
     "DEFAULT_NUMBER_OF_SAMPLES_TO_READ": given(lambda a: a.device.default_samples(a.own)),
     "AUTO_START": fixed(True),
     "READ_ALL_AVAIL_SAMP": changed(
@@ -139,9 +154,9 @@ WRITE: dict[str, Property] = {
         _set_regeneration,
         _REGENERATION,
     ),
-    "CURR_WRITE_POS": given(lambda a: a.device.written(a.own)),
-    "SPACE_AVAIL": given(lambda a: a.device.space(a.own)),
-    "TOTAL_SAMP_PER_CHAN_GENERATED": given(lambda a: a.device.generated(a.own)),
+    "CURR_WRITE_POS": _at_work(lambda a: a.device.written(a.own)),
+    "SPACE_AVAIL": _at_work(lambda a: a.device.space(a.own)),
+    "TOTAL_SAMP_PER_CHAN_GENERATED": _at_work(lambda a: a.device.generated(a.own)),
     "RELATIVE_TO": accepted(CURRENT_WRITE, key=WRITE_RELATIVE_TO),
     "OFFSET": accepted(0, key=WRITE_OFFSET),
     "WAIT_MODE": accepted(_SLEEP, _POLL, _YIELD, _SLEEP),
