@@ -16,8 +16,8 @@ from dearig.analysis.experiment import separating_experiment
 from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
+    Evaluation,
     SeparatingExperiment,
-    Stand,
     covariance_table,
     pooled_rms,
 )
@@ -32,13 +32,13 @@ from dearig.analysis.readings.early_ends import choose
 from dearig.analysis.readings.quality import check_enough, extrapolated, few_data, inspect
 from dearig.analysis.readings.record import (
     Source,
-    air_sentences_of,
+    air_texts_of,
     as_record,
     check_named_once,
     compare,
-    noise_sentences,
+    noise_texts,
     open_all,
-    room_sentences,
+    room_texts,
 )
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -56,7 +56,7 @@ from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
-from dearig.model.fitting.prediction import prediction_error
+from dearig.model.fitting.prediction import prediction_error, prediction_gain
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.verdict import NOTHING_MISSING
@@ -312,9 +312,9 @@ def _prepared(
         for r in (*recordings, *others)
         for sentence in inspect(r, settings.drive, to_fit=r in recordings).findings
     ]
-    said += noise_sentences((*recordings, *others))
-    said += room_sentences((*recordings, *others))
-    said += air_sentences_of(recordings)
+    said += noise_texts((*recordings, *others))
+    said += room_texts((*recordings, *others))
+    said += air_texts_of(recordings)
     said += extrapolated(recordings, others, settings.drive)
     films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
     if len(films) > 1:
@@ -369,7 +369,7 @@ def _outcome(
     if not finding.steps:
         models = [finding.baseline, finding.final]
     stands = tuple(
-        Stand(
+        Evaluation(
             tuple(name for name, _ in stage.model.effects),
             _compared(recordings, stage.of_each(len(recordings)), "train", drive, failed),
             _compared(others, [stage.predicting] * len(others), "validation", drive, failed),
@@ -418,7 +418,11 @@ def _outcome(
         prediction_errors=_prediction_errors(
             [r for r in others if r.name in compared], finding, drive
         ),
+        gain=_gain(stands, own, noise) if finding.steps else None,
     )
+    if not outcome.recommends_final:
+        plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)
+        outcome = replace(outcome, model=plain)
     history = _history(outcome, recordings)
     return replace(outcome, model=replace(outcome.model, history=history))
 
@@ -479,7 +483,7 @@ def _own(
     return {name: of(name) for name in records}
 
 
-def _without_own(stand: Stand, own: dict[str, Own | None]) -> Stand:
+def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
     """Return ``stand`` with each recording's events, and what they leave of untouched ones."""
 
     def of(comparison: Comparison) -> Comparison:
@@ -493,6 +497,29 @@ def _without_own(stand: Stand, own: dict[str, Own | None]) -> Stand:
     return replace(
         stand, train=tuple(map(of, stand.train)), validation=tuple(map(of, stand.validation))
     )
+
+
+def _gain(stands: Sequence[Evaluation], own: dict[str, Own | None], noise: float) -> float | None:
+    """Return twice the log of the odds that validation gives to the final model, over the first.
+
+    None where nothing validates it, minus infinity where it cannot follow what the first one can.
+    """
+    last = {c.name: c for c in stands[-1].validation}
+    first = stands[0].validation
+    if any(c.name not in last for c in first):
+        return -math.inf
+    gains = []
+    for one in first:
+        two, found = last[one.name], own.get(one.name)
+        alone = found.signal if found is not None and found.signal.size == one.time.size else 0.0
+        gains.append(
+            prediction_gain(
+                one.measured - one.model - alone,
+                two.measured - two.model - alone,
+                one.noise or noise,
+            )
+        )
+    return sum(gains) if gains else None
 
 
 def _noise(recordings: Sequence[Recording], drive: str) -> float:
@@ -523,12 +550,13 @@ def _experiment(
 def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[str, Any]:
     """Return the origin of the model, for its file."""
     finding, stands = outcome.finding, outcome.stands
+    stage = finding.final if outcome.recommends_final else finding.baseline
     shown = SHOWN[outcome.kind]
 
     def rms(comparisons: Sequence[Comparison]) -> float | None:
         return pooled_rms(comparisons) * shown.error_factor if comparisons else None
 
-    def errors(stand: Stand) -> dict[str, Any]:
+    def errors(stand: Evaluation) -> dict[str, Any]:
         return {
             f"train_rms_{shown.suffix}": rms(stand.train),
             f"validation_rms_{shown.suffix}": rms(stand.validation),
@@ -542,7 +570,8 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
         "verdict": outcome.verdict,
         "status": outcome.status,
         "interrupted": finding.interrupted,
-        "mean_square_over_noise": finding.final.cost,
+        "recommended": "final" if outcome.recommends_final else "baseline",
+        "mean_square_over_noise": stage.cost,
         f"noise_floor_{shown.suffix}": outcome.noise * shown.error_factor,
         "notes": [*finding.notes, *outcome.quality],
         "before": errors(stands[0]),
@@ -557,7 +586,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
                 "indistinguishable_from": list(s.indistinguishable_from),
                 "evidence": list(s.evidence),
             }
-            for s in finding.steps
+            for s in (finding.steps if outcome.recommends_final else ())
         ],
         "estimate": [
             {
@@ -570,7 +599,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
                 "at_bound": e.at_bound,
                 "note": e.note,
             }
-            for e in finding.final.estimates
+            for e in stage.estimates
         ],
-        "covariance": covariance_table(finding.final.covariance_names, finding.final.covariance),
+        "covariance": covariance_table(stage.covariance_names, stage.covariance),
     }
