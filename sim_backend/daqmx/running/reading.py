@@ -51,6 +51,13 @@ class Reader:
         work = self._input(task)
         with self._state.present():
             raise_failure(task, read=0)
+            if task.clock is None and (task.read_from, task.read_offset) != (CURRENT_READ, 0):
+                raise DaqmxError(
+                    Code.INVALID_VALUE,
+                    "Properties: RELATIVE_TO, OFFSET; without a sample clock there is no buffer "
+                    f"with other places to read from. Task Name: {task.name}",
+                    read=0,
+                )
             started = self._start(task)
         if task.clock is None:
             return self._read_still(task, work, max(1, samples), timeout, started=started)
