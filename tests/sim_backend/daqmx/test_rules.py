@@ -203,8 +203,8 @@ def _exported_to_nowhere(ai):
     ai.control(TaskMode.TASK_VERIFY)
 
 
-def _read_from_a_missing_trigger(ai):
-    ai.in_stream.relative_to = ReadRelativeTo.REFERENCE_TRIGGER
+def _read_from_the_first(ai):
+    ai.in_stream.relative_to = ReadRelativeTo.FIRST_SAMPLE
     ai.read()
 
 
@@ -328,7 +328,7 @@ RULES = {
         -200378,
     ),
     "a scale of another unit": (_ai("Dev1/ai0", custom_scale_name="nothing"), -200447),
-    "a read from a trigger that the task does not have": (_with_inputs(_read_from_a_missing_trigger), -200077),
+    "a read from another place": (_with_inputs(_read_from_the_first), -200077),
     "a channel that is not in the task": (
         _with_inputs(lambda ai: ai.ai_channels["other"].ai_max),
         -200486,
