@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
-from dearig.analysis.readings.record import Source
+from dearig.analysis.readings.opening import Source
 from dearig.analysis.simulate import simulate_model
 from dearig.analysis.validate import validate_model
 from dearig.api.models import ModelSource, as_model_file
