@@ -351,7 +351,7 @@ def _observe(
 
 
 def _goes_on_and_enables(
-    process: subprocess.Popen[str], device: Device, clock: PacedClock, bound: float
+    process: subprocess.Popen[str], device: SimulatedCard, clock: PacedClock, bound: float
 ) -> bool:
     """Let a run that has just been frozen go on after ``bound`` s, when its guardian has acted.
 
