@@ -27,6 +27,7 @@ from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, co
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import Lobes
 from dearig.model.simulation.strip import Strip
+from dearig.recording.content.fields import CONDITIONS
 from dearig.recording.content.layout import SIGNALS
 from dearig.recording.content.physical import resolution
 from dearig.recording.content.rest_noise import MIN_QUIET, ReadingNoise
@@ -260,13 +261,13 @@ def _air(
 
 
 def room_texts(recordings: Sequence[Recording]) -> list[str]:
-    """Return a sentence with the means of temperature and humidity; none where not recorded."""
+    """Return a sentence with the means of the room's conditions; none where not recorded."""
     parts = []
-    for name, unit in (("temperature_degC", "°C"), ("relative_humidity_percent", "%")):
-        means = [m for m in (getattr(r, name) for r in recordings) if m is not None]
+    for name, condition in CONDITIONS.items():
+        means = [r.conditions[name] for r in recordings if name in r.conditions]
         if means:
             ends = dict.fromkeys(f"{m:.1f}" for m in (min(means), max(means)))
-            parts.append(f"{' to '.join(ends)} {unit}")
+            parts.append(f"{' to '.join(ends)} {condition.unit}")
     return [f"the room was at {', '.join(parts)} (means of the recordings)"] if parts else []
 
 
