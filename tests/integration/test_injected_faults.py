@@ -21,7 +21,7 @@ def runs():
 def test_a_call_that_fails_ends_in_a_sentence_and_loses_nothing(runs, kind, most):
     whole, calls = runs.run(kind, 0)
     assert (whole.code, whole.wrong) == (0, ())
-    outcomes = [runs.run(kind, n)[0] for n in chosen(calls, most, seed=0)]
+    outcomes = [runs.run(kind, n)[0] for n in chosen(calls, most, seed=1)]
     assert [outcome for outcome in outcomes if outcome.wrong] == []
     if kind != "allocations":
         assert any(outcome.code for outcome in outcomes)
