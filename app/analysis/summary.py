@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.decimate import decimate
-from dearig.analysis.readings.record import compare
+from dearig.analysis.readings.compare import compare
+from dearig.analysis.readings.record import Readings
 from dearig.analysis.spectrum import amplitude_density
 from dearig.config.modelfile import load_model
 from dearig.errors import DearigError, InputError
@@ -302,7 +303,7 @@ def assess(
     try:
         chosen, of_these = _model(model, recording)
         fitted = bool(of_these) and recording.sha256 in of_these
-        errors = compare(recording, chosen, "validation", drive, hashed=False).errors
+        errors = compare(Readings(recording, drive), chosen, "validation", hashed=False).errors
     except DearigError as error:
         unfit = str(error)
     progress(recording.name, 1.0)
@@ -324,7 +325,7 @@ def curves(
     errors, unfit = None, ""
     try:
         chosen, _ = _model(model, recording)
-        compared = compare(recording, chosen, "validation", drive, hashed=False)
+        compared = compare(Readings(recording, drive), chosen, "validation", hashed=False)
         drawn = _short(time, compared.model, _COLUMNS)
         residual = _short(time, compared.measured - compared.model, _COLUMNS)
         errors = compared.errors
@@ -382,7 +383,7 @@ def spectra(
     residual = None
     try:
         chosen, _ = _model(model, recording)
-        compared = compare(recording, chosen, "validation", drive, hashed=False)
+        compared = compare(Readings(recording, drive), chosen, "validation", hashed=False)
         residual = amplitude_density(compared.measured - compared.model, recording.rate)
     except DearigError:
         residual = None  # the curves say why
