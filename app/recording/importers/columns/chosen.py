@@ -102,10 +102,16 @@ def command_line(
     return shlex.join([*words, *more])
 
 
+#: A name of several levels as pandas writes it: ('rig', 'voltage_kV').
+_LEVELS = re.compile(r"\((?:['\"][^'\"]*['\"], )+['\"]([^'\"]*)['\"]\)")
+
+
 def own_name(source: Source, column: str) -> str:
     """Return the name of ``column`` without the group or path that its format puts before it."""
     strip = getattr(source, "own_name", None)
     name = column if strip is None else strip(column)
+    if levels := _LEVELS.fullmatch(name):
+        name = levels[1]
     return re.sub(r" #\d+$", "", name)  # of a name that is there twice
 
 

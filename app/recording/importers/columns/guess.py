@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,7 +12,7 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.recording.importers.columns.chosen import LIKELY, Chosen, Pick, own_name
 from dearig.recording.importers.columns.compression import as_compression
-from dearig.recording.importers.columns.proposal import Proposal
+from dearig.recording.importers.columns.proposal import Proposal, counts, is_even, values_in
 from dearig.recording.importers.quantities.clock_numbers import by_sixties, counts_days, epoch_unit
 from dearig.recording.importers.quantities.labels import (
     DIMENSIONS,
@@ -36,6 +37,8 @@ PULLS = ("nominal_stress", "true_stress", "force")
 FILM = (*LENGTHS[:-1], *PULLS)
 #: Columns of one quantity whose values are compared, at most.
 COMPARED_MAX = 8
+#: Name of the time of a group of channels in a MAT file of asammdf.
+_OF_ASAMMDF = re.compile(r"DGM?\d+_timestamps")
 #: Columns of one quantity that a message says to be open, at most.
 ASKED_MAX = 3
 
@@ -154,10 +157,29 @@ class Guess:
                 self._take_asked(quantity, self._of_unit(quantity, left=False))
             elif by_unit:
                 self._take_by_unit(quantity)
+            if quantity == "time" and quantity not in self._chosen.picked:
+                self._take_even()
             return
         if len(found) > 1:
             self._chosen.unsure.append(f"{quantity.replace('_', ' ')} may be {listing(found)}")
         self._accept(quantity, found, "column" if len(found) > 1 else "", several=len(found) > 1)
+
+    def _take_even(self) -> None:
+        """Propose the one column without a quantity that rises in even steps for the time."""
+        source = self._chosen.source
+        step = getattr(source, "step_s", None)
+        free = [n for n in self._free if self._labels[n] == Label(n)]
+        if not free or len(free) > COMPARED_MAX or len(free) == len(self._labels):
+            return
+        if step is not None and step(list(source.names)) is not None:
+            return
+        values = values_in(self._chosen, free)
+        even = [n for n in values if is_even(values[n]) and not counts(values[n])]
+        if len(even) == 1:
+            self._chosen.unsure.append(
+                f"{even[0]!r} may be the time, since its values rise in even steps"
+            )
+            self._accept("time", even, "column", several=False)
 
     def _accept(self, quantity: str, found: Sequence[str], doubt: str, several: bool) -> None:
         """Pick the first of ``found``, in the unit that it names."""
@@ -212,6 +234,8 @@ class Guess:
         if quantity != "time":
             return likely, ""
         values = self._chosen.source.read([column])[column]
+        if _OF_ASAMMDF.fullmatch(self._own(column)):
+            return "s", "is in s, as asammdf writes it"
         if unit := epoch_unit(values):
             return unit, f"counts from 1970 in {unit}, by its values"
         if counts_days(values):
@@ -256,7 +280,9 @@ class Guess:
             if quantity in self._labels[n].quantities or self._labels[n].raw == quantity
         ]
         with_unit = [n for n in found if self._labels[n].unit]
-        return with_unit or found
+        # in its own unit, and not in the volts of an instrument
+        own = [n for n in with_unit if quantity in self._labels[n].quantities]
+        return own or with_unit or found
 
     def _different(self, names: list[str]) -> list[str]:
         """Return ``names`` without columns that repeat another one's values, if they are few."""

@@ -18,7 +18,7 @@ from dearig.recording.importers.quantities.labels import (
 )
 from dearig.recording.importers.source import listing
 
-__all__ = ["Proposal", "first_values"]
+__all__ = ["Proposal", "counts", "first_values", "is_even", "values_in"]
 
 #: Smallest and largest stretch of a film, and what its first value differs from 1, in a proposal.
 STRETCH_MIN, STRETCH_MAX, AT_REST = 0.2, 15.0, 1e-3
@@ -54,7 +54,7 @@ class Proposal:
         if len(free) + len(there) < 3 - self._timed:
             return  # the error that says which quantities there are not is clearer
         if "time" not in there and not self._timed:
-            self._offer("time", [n for n in self._free("time") if _is_even(self._values[n])])
+            self._offer("time", [n for n in self._free("time") if is_even(self._values[n])])
         stress = [q for q in ("nominal_stress", "force") if self._in_unit(q)]
         if not self._in_unit("voltage") and (
             stress or any(map(_is_stretch, self._values.values()))
@@ -72,6 +72,8 @@ class Proposal:
         self._chosen.unsure.append(
             f"the names {listing(self._chosen.source.names)} do not say what the columns are"
         )
+        if hint := getattr(self._chosen.source, "hint", ""):
+            self._chosen.unsure.append(hint)
 
     def _free(self, quantity: str) -> list[str]:
         """Return the columns whose units do not exclude ``quantity``; no numbers of rows."""
@@ -79,7 +81,7 @@ class Proposal:
         labels = {n: self._labels[n] for n in self._values if n not in taken}
         return [
             n for n, label in labels.items()
-            if not label.unknown and not _counts(self._values[n])
+            if not label.unknown and not counts(self._values[n])
             and (not label.unit or DIMENSIONS[quantity] in label.dimensions)
         ]  # fmt: skip
 
@@ -139,7 +141,7 @@ def first_values(chosen: Chosen) -> str:
     ) + (f" and {more} more columns" if more > 0 else "")
 
 
-def _is_even(values: np.ndarray) -> bool:
+def is_even(values: np.ndarray) -> bool:
     """Return True if ``values`` (n,) rise in even steps, as a time does."""
     steps = np.diff(values)
     if not steps.size or not np.isfinite(steps).all() or steps.min() <= 0.0:
@@ -153,6 +155,6 @@ def _is_stretch(values: np.ndarray) -> bool:
     return abs(float(values[0]) - 1.0) < AT_REST and low > STRETCH_MIN and 1.0 < high < STRETCH_MAX
 
 
-def _counts(values: np.ndarray) -> bool:
+def counts(values: np.ndarray) -> bool:
     """Return True if ``values`` number the rows."""
     return bool((np.diff(values) == 1.0).all())

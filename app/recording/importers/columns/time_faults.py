@@ -7,15 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dearig.errors import InputError
 from dearig.recording.content.timestamps import not_forward
-from dearig.recording.importers.source import NeedsOptionError
+from dearig.recording.importers.source import LOST_MAX, NeedsOptionError, skip_or_refuse
 
-__all__ = ["LOST_MAX", "check_forward", "one_clock", "skip_or_refuse"]
+__all__ = ["check_forward", "one_clock"]
 
-#: Largest part of the rows that a printed command leaves out. Faults that are rarer are those of
-#: single rows; where they are more frequent something else is wrong with the column.
-LOST_MAX = 0.1
 #: s: a day, the least fall of a time of day that is the next day, the step of summer time.
 _DAY, _NEXT_DAY, _SUMMER = 86_400.0, 43_200.0, 3600.0
 
@@ -77,22 +73,6 @@ def check_forward(time: np.ndarray, column: str, place: Callable[[int], str], pa
     lost = int((time[1:] <= latest[:-1]).sum())
     more = ", and --rate-Hz replaces the time of evenly spaced samples"
     raise skip_or_refuse(said, lost, time.size, more)
-
-
-def skip_or_refuse(said: str, lost: int, rows: int, more: str = "") -> InputError:
-    """Return the error for ``lost`` of some ``rows`` that cannot be used, the first one ``said``.
-
-    An option leaves single rows out; it is not proposed where it would leave out what matters.
-    """
-    if lost <= LOST_MAX * rows:
-        counted = f" ({lost} of {rows})" if lost > 1 else ""
-        return NeedsOptionError(
-            f"{said}; --skip-bad-rows leaves such rows out{counted}{more}", "--skip-bad-rows"
-        )
-    return InputError(
-        f"{said}; {lost} of {rows} rows are so, too many to leave out: correct the file, or export "
-        f"it again{more}"
-    )
 
 
 def _shared(time: np.ndarray) -> tuple[float, str] | None:

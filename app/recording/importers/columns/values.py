@@ -17,7 +17,6 @@ from dearig.recording.importers.columns.specimen import Specimen, specimen_told
 from dearig.recording.importers.columns.time_faults import (
     check_forward,
     one_clock,
-    skip_or_refuse,
 )
 from dearig.recording.importers.quantities.clock_numbers import by_sixties
 from dearig.recording.importers.quantities.labels import names_of, suggestion
@@ -26,6 +25,7 @@ from dearig.recording.importers.source import (
     NeedsOptionError,
     Source,
     listing,
+    skip_or_refuse,
 )
 
 __all__ = ["Values", "values_of"]
@@ -68,8 +68,6 @@ def values_of(
     can be.
     """
     values = Values(_kind(chosen), {}, notes=list(chosen.notes))
-    values.notes += getattr(chosen.source, "notes", ())
-    values.warnings += getattr(chosen.source, "doubts", ())
     if values.kind == "actuator":
         if "force" in chosen.picked:
             values.warnings.append("the force was not used: actuator data have none")
@@ -219,6 +217,8 @@ def _read(
     columns = [pick.column for pick in picked.values()]
     step = _step(chosen, columns, rate_Hz)
     raw = _read_columns(chosen, picked, values)
+    values.notes += getattr(source, "notes", ())
+    values.warnings += getattr(source, "doubts", ())
     columns = [pick.column for pick in picked.values()]
     sizes = {column: raw[column].size for column in columns}
     size = min(sizes.values())
