@@ -9,6 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 from openpyxl import Workbook
 
 from dearig.errors import InputError
@@ -341,3 +342,22 @@ def test_mat_7_3_is_known_by_the_signature_behind_its_text(tmp_path: Path) -> No
     text = b"MATLAB 5.0 MAT-file, Platform: Python".ljust(124) + b"\0\2IM"
     path.write_bytes(text + content[len(text) :])
     same(taken(path))
+
+
+@pytest.mark.parametrize("again", [0.0, 60.0])
+def test_a_tdms_file_that_was_continued_is_said(tmp_path: Path, again: float) -> None:
+    path = tmp_path / "in.tdms"
+    start = np.datetime64("2026-03-02T09:00:00")
+    for part, late in ((slice(0, 30), 0.0), (slice(30, ROWS), again)):
+        about = {
+            "wf_increment": 0.01, "wf_start_offset": 0.0,
+            "wf_start_time": start + np.timedelta64(int(late * 1e3), "ms"),
+        }  # fmt: skip
+        with TdmsWriter(path, mode="w" if part.start == 0 else "a") as writer:
+            writer.write_segment(
+                [ChannelObject("rig", n, v[part], about) for n, v in list(COLUMNS.items())[1:]]
+            )
+    done = imported(path)
+    assert any("was continued" in d and "60 s after its start" in d for d in done.doubts) == (
+        again > 0
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -97,7 +97,7 @@ class Guess:
 
     def _take_one(self, quantities: Sequence[str], by_unit: Sequence[str]) -> None:
         """Pick the first of ``quantities`` that a name says, or one ``by_unit``, or an open one."""
-        ways = [(q, self._take) for q in quantities]
+        ways: list[tuple[str, Callable[[str], None]]] = [(q, self._take) for q in quantities]
         ways += [(q, self._take_by_unit) for q in by_unit]
         ways += [(q, self._take_asked) for q in quantities]
         for quantity, take in ways:

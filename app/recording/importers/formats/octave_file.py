@@ -92,7 +92,7 @@ class _Reader:
             yield from self._numbers(kind, name, inside, path)
         elif kind in ("scalar", "float scalar"):
             value = np.array([float(self._next())])
-            yield inside, Stored(lambda: value, 1, name, table=path)
+            yield inside, _stored(value, name, path)
         elif kind == "scalar struct":
             self._word("ndims")
             self._next()
@@ -109,7 +109,7 @@ class _Reader:
             count = (limit - base) / step if step else 0.0
             if 0.0 < count < RANGE_MAX:
                 values = base + step * np.arange(int(count * (1.0 + 1e-12) + 1e-9) + 1)
-                yield path, Stored(lambda: values, values.size, name, table=table)
+                yield path, _stored(values, name, table)
             return
         line = self._next()
         match = _LINE.fullmatch(line.rstrip())
@@ -133,16 +133,16 @@ class _Reader:
                 raise ValueError(f"{path} has {matrix.shape[0]} rows of {matrix.shape[1]} numbers")
         if 1 in matrix.shape:
             flat = matrix.reshape(-1)
-            yield path, Stored(lambda: flat, flat.size, name, table=table)
+            yield path, _stored(flat, name, table)
             return
         if matrix.shape[0] < min(matrix.shape[1], ROWS_AS_COLUMNS + 1):
             matrix = matrix.T
         for place in range(matrix.shape[1] if matrix.shape[1] <= MATRIX_MAX else 0):
-            values = matrix[:, place]
-            yield (
-                f"{path}[{place}]",
-                Stored(lambda values=values: values, values.size, f"{name}[{place}]", table=table),
-            )  # type: ignore[misc]
+            yield f"{path}[{place}]", _stored(matrix[:, place], f"{name}[{place}]", table)
+
+
+def _stored(values: np.ndarray, own: str, table: str) -> Stored:
+    return Stored(lambda: values, values.size, own, table=table)
 
 
 def _sniff(head: bytes) -> bool:

@@ -39,7 +39,10 @@ def block_names(group: h5py.Group, name: str, width: int) -> list[str]:
             if f"{items}_level{number}" not in group:
                 break
             texts = _texts_of(item(group, f"{items}_level{number}"))
-            codes = np.asarray(item(group, f"{items}_label{number}")[()]).astype(int).ravel()
+            labels = item(group, f"{items}_label{number}")
+            if not isinstance(labels, h5py.Dataset) or labels.nbytes > ATTRIBUTE_MAX:
+                return []
+            codes = np.asarray(labels[()]).astype(int).ravel()
             levels.append([texts[code] if 0 <= code < len(texts) else "" for code in codes])
     except (Refused, KeyError, OSError, TypeError, ValueError):
         return []

@@ -395,13 +395,13 @@ class TextFile(NamedColumns[Column]):
         import pandas as pd
 
         layout = self.layout
+        places = {c.place for c in self._wanted}
+        places |= {c.date_place for c in self._wanted if c.date_place is not None}
         try:
             table = pd.read_csv(
                 BytesReader(block), header=None, names=range(layout.cells), index_col=False,
                 sep=r"\s+" if layout.delimiter is None else layout.delimiter, comment="#",
-                usecols=sorted(
-                    {c.place for c in self._wanted} | {c.date_place for c in self._wanted} - {None}
-                ), dtype=str, na_filter=False,
+usecols=sorted(places), dtype=str, na_filter=False,
                 skipinitialspace=self._is_spaced, on_bad_lines="skip", engine="c",
                 low_memory=False,
             )  # fmt: skip
