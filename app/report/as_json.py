@@ -21,10 +21,10 @@ if TYPE_CHECKING:
         BranchTrial,
         Comparison,
         DiagnoseOutcome,
+        Evaluation,
         IdentifyOutcome,
         Published,
         SpringCandidate,
-        Stand,
         ValidateOutcome,
     )
     from dearig.model.diagnosis.results import Candidate, Stage, Step
@@ -235,6 +235,8 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "residual_before": {s.record: _signature_json(s, outcome.kind) for s in finding.before},
         "verdict": outcome.verdict,
         "verdict_reasons": list(outcome.judgement.reasons),
+        "recommended": "final" if outcome.recommends_final else "baseline",
+        "validation_gain": _number(outcome.gain),
         "status": outcome.status,
         "events": [
             {
@@ -247,7 +249,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             for c in (*after.train, *after.validation)
             for e in c.events
         ],
-        "families": [{"family": f, "probability": p} for f, p in finding.families],
+        "families": [{"family": f, "probability": p} for f, p in outcome.families],
         "unnamed": None
         if finding.unnamed is None
         else {
@@ -297,7 +299,7 @@ def _names(*groups: tuple[Comparison, ...]) -> list[str]:
     return list(dict.fromkeys(c.name for group in groups for c in group))
 
 
-def _stand_json(stand: Stand) -> dict[str, Any]:
+def _stand_json(stand: Evaluation) -> dict[str, Any]:
     kind = stand.train[0].kind if stand.train else "actuator"
     by_record = {c.name: _measures_json((c,), kind) for c in stand.validation}
     return {

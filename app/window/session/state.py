@@ -95,6 +95,7 @@ class Session(QObject):
     recent_changed = Signal()
     recorded = Signal(Path)
     running_changed = Signal(bool)
+    study_finished = Signal(object)  #: a ``Study`` has just been saved in the folder
     hold_changed = Signal()  #: another feedback belongs to the sequence
     blocks_changed = Signal()
     message = Signal(str)  #: text for the status bar

@@ -11,8 +11,11 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.window.high_voltage.state import HighVoltage
+from dearig.window.recordings.page import RecordingsPage
+from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from dearig.window.study.page import StudyPage
 from tests.window.conftest import SHORT
 
 LEFT = Qt.MouseButton.LeftButton
@@ -26,8 +29,8 @@ def places(window: MainWindow) -> list[QWidget]:
     return [
         run.start_button, run.arm_button, run.operator, run.paced, run.overlays.models[0],
         run.display.table, run.display.mark_bar.button, run.plots, window.list,
-        window.sequence_page.editor.table, window.rig_page.tabs,
-        window.recordings_page, window.study_page, window,
+        window.sequence_page.editor.table, window.page(RigPage).tabs,
+        window.page(RecordingsPage), window.page(StudyPage), window,
     ]  # fmt: skip
 
 
@@ -67,7 +70,7 @@ def test_in_a_run_a_stop_key_stops_while_a_field_has_the_focus(
     page.paced.setChecked(True)
     qtbot.mouseClick(page.arm_button, LEFT)
     qtbot.mouseClick(page.start_button, LEFT)
-    window.show_page(window.study_page)
+    window.show_page(window.page(StudyPage))
     search.setFocus()
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
         qtbot.keyClick(search, key)

@@ -25,9 +25,11 @@ from dearig.recording import open_recording
 from dearig.recording.reading.recording import Recording
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
+from dearig.window.rig.page import RigPage
 from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from tests.deep import mostly_deep
 from tests.window.conftest import SHORT
 
 LEFT = Qt.MouseButton.LeftButton
@@ -150,7 +152,7 @@ SEGMENTS = {
 BACK = '[[segment]]\nkind = "ramp"\nto_kV = 0.0\nduration_s = 1.0\n'
 
 
-@pytest.mark.parametrize("kind", SEGMENTS)
+@pytest.mark.parametrize("kind", mostly_deep(SEGMENTS, ["half_sine", "hold", "steps", "chirp"]))
 def test_stop_ends_any_segment(
     qtbot: QtBot,
     quick_ramp: Session,
@@ -189,10 +191,10 @@ def test_stop_by_key_from_another_page(qtbot: QtBot, window: MainWindow, key: Qt
     page.paced.setChecked(True)
     click(qtbot, page.arm_button)
     click(qtbot, page.start_button)
-    window.show_page(window.rig_page)
+    window.show_page(window.page(RigPage))
     qtbot.waitUntil(lambda: seconds(page) > 0.0, timeout=RUN_MS)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
-        qtbot.keyClick(window.rig_page, key)
+        qtbot.keyClick(window.page(RigPage), key)
     assert ended.args[0].headline == "Stopped"
 
 
@@ -386,6 +388,7 @@ def resident() -> float:
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads /proc")
+@pytest.mark.deep
 def test_twenty_runs_leave_nothing_behind(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:

@@ -13,7 +13,7 @@ from dearig.errors import InputError
 from dearig.recording.importers.columns.chosen import Chosen, Pick
 from dearig.recording.importers.columns.guess import LENGTHS, PULLS
 from dearig.recording.importers.columns.markers import markers_in
-from dearig.recording.importers.columns.specimen import Specimen, specimen_told
+from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
 from dearig.recording.importers.columns.time_faults import (
     check_forward,
     one_clock,
@@ -153,7 +153,7 @@ def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[s
 
     Raises ``NeedsOptionError`` for a size of the specimen that is missing, for both at once.
     """
-    there, told = chosen.picked, specimen_told(getattr(chosen.source, "block", ()))
+    there, told = chosen.picked, specimen_from_header(getattr(chosen.source, "block", ()))
     length = next((q for q in LENGTHS if q in there), None)
     pull = next((q for q in PULLS if q in there), None)
     if length is None:
