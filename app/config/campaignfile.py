@@ -97,7 +97,7 @@ every_cycle = 0                 # of the others keep every n-th cycle at full ra
 
 # notifications, sent after a run, at 0 V
 # [notify]
-# command = ["python", "tell.py"]             # a program, which gets JSON on its standard input
+# command = ["python", "notify.py"]           # a program, which gets JSON on its standard input
 # webhook = "env:LAB_WEBHOOK"                 # an address, or a variable that has it
 # on = ["run-ended", "tripped", "queue-stopped"]
 # timeout_s = 30.0                            # time for the program, and for the webhook's answer
