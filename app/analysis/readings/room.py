@@ -8,6 +8,7 @@ import numpy as np
 import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.readings.environment import CELSIUS, HUMIDITY, air_texts
+from dearig.recording.content.fields import CONDITIONS
 from dearig.recording.reading.recording import Recording
 
 __all__ = ["air_texts_of", "moisture_of", "room_texts", "warmth_of"]
@@ -49,13 +50,13 @@ def _air(
 
 
 def room_texts(recordings: Sequence[Recording]) -> list[str]:
-    """Return a sentence with the means of temperature and humidity; none where not recorded."""
+    """Return a sentence with the means of the room's conditions; none where not recorded."""
     parts = []
-    for name, unit in (("temperature_degC", "°C"), ("relative_humidity_percent", "%")):
-        means = [m for m in (getattr(r, name) for r in recordings) if m is not None]
+    for name, condition in CONDITIONS.items():
+        means = [r.conditions[name] for r in recordings if name in r.conditions]
         if means:
             ends = dict.fromkeys(f"{m:.1f}" for m in (min(means), max(means)))
-            parts.append(f"{' to '.join(ends)} {unit}")
+            parts.append(f"{' to '.join(ends)} {condition.unit}")
     return [f"the room was at {', '.join(parts)} (means of the recordings)"] if parts else []
 
 
