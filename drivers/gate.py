@@ -411,7 +411,7 @@ class BlockGate:
     """Gate of a waveform that is corrected while it is played; ``open_block_gate`` makes it.
 
     A correction is a part of the feedforward's voltage: sample k of ``waveform`` is
-    ``feedforward[k] * (1 + c[k])`` and is computed here, from samples that have passed. A controller
+    ``feedforward[k] * (1 + c[k])`` and is computed here, from passed samples. A controller
     gives one number for each block, the correction at its last sample. From the end of the
     block before it changes linearly. Nothing else that it gives can reach an output.
 
