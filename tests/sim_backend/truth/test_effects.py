@@ -15,6 +15,7 @@ from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effects import end_stop, interference, loose_contact, sudden, thermal
 from dearig.sim_backend.truth.film import NO_COURSE, FilmNumbers, Hidden
 from dearig.sim_backend.truth.plant import TruthPlant
+from tests.deep import one_of_each
 from tests.sim_backend.truth.test_cases import FORMS
 
 NUMBERS = FilmNumbers.of(THESIS_FILM, THESIS_LOAD, TABLE_3)
@@ -100,7 +101,7 @@ ON_FILM = [p for p in FORMS if drawn(p.values[1]).on_film is not None]
 COARSER = {"maxwell_slip": 0.3e-6, "makkar": 0.2e-6}
 
 
-@pytest.mark.parametrize(("family", "form"), ON_FILM)
+@pytest.mark.parametrize(("family", "form"), one_of_each(ON_FILM, lambda p: p.values[0]))
 def test_the_film_is_integrated_to_a_twentieth_of_a_micrometre(family, form):
     time, voltage = edges()
     numbers = drawn(form, 1).on_film(NUMBERS)
