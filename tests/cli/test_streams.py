@@ -91,4 +91,5 @@ def test_ctrl_c_that_is_held_down_ends_with_a_sentence_on_the_output(tmp_path: P
     assert process.returncode == 130
     assert "Traceback" not in said
     assert "0 V" in said.splitlines()[-1]
-    assert open_recording(out).outcome.startswith("interrupted")
+    # two presses more are the wish not to wait for the disk: then the file is not closed
+    assert open_recording(out).samples > 0
