@@ -1,6 +1,6 @@
 """The command ``dearig``: its groups of commands, its exit codes and its error messages.
 
-Nothing heavy is imported here, so that ``dearig --help`` answers at once: each command imports
+Nothing heavy is imported here, so that ``dearig --help`` answers immediately: each command imports
 what it needs when it runs.
 """
 

@@ -78,7 +78,7 @@ def watch(
             show_default="0.5, and 0.1 for the page",
         ),
     ] = None,
-    once: Annotated[bool, typer.Option("--once", help="Look once, and end.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="Print one snapshot and exit.")] = False,
     json: Json = None,
     force: Force = False,
 ) -> None:
@@ -122,8 +122,8 @@ def _serve(
         if shared:
             print_line(
                 console,
-                "Whoever has this address can look on; nobody can change anything. The connection "
-                "is not encrypted.",
+                "Everyone who has this address can watch; no one can change anything. "
+                "The connection is not encrypted.",
             )
 
     serve_watch(view, port, host, token, every, started)
