@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dearig.cli.hints import with_hints
 from dearig.cli.options import (
     FilmName,
     Force,
@@ -24,6 +23,7 @@ from dearig.cli.output import (
     optional,
     print_line,
     print_lines,
+    with_hints,
     working,
     write_result,
 )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dearig.errors import InputError
+from dearig.errors import Hints, InputError, hints_of
 from dearig.printable import MESSAGE_MAX, printable
 
 if TYPE_CHECKING:
@@ -23,10 +24,12 @@ __all__ = [
     "check_files",
     "console_for",
     "open_recordings",
+    "option_name",
     "optional",
     "print_line",
     "print_lines",
     "version",
+    "with_hints",
     "working",
     "write_result",
 ]
@@ -80,6 +83,37 @@ def console_for(json: str | None = None) -> Console:
     from dearig.cli.console import PrintableConsole
 
     return PrintableConsole(stderr=json == "-")
+
+
+#: What is added to a text about these options, in place of their names in brackets.
+_SUFFIXES = {
+    "force": ", or use --force",
+    "skip_bad_rows": "; --skip-bad-rows leaves such rows out",
+}
+
+
+def with_hints(text: str | BaseException) -> str:
+    """Return a text, or what an error says, with the options and commands that it is about."""
+    hints = hints_of(text)
+    named = dict.fromkeys(name for hint in hints for name in _named(hint))
+    suffixes = dict.fromkeys(
+        _SUFFIXES[option] for hint in hints for option in hint.options if option in _SUFFIXES
+    )
+    brackets = f" ({', '.join(named)})" if named else ""
+    return f"{text}{brackets}{''.join(suffixes)}"
+
+
+def option_name(name: str) -> str:
+    """Return the option for a value: ``--gauge-length-mm`` for ``gauge_length_mm``."""
+    return f"--{name.replace('_', '-')}"
+
+
+def _named(hint: Hints) -> Iterator[str]:
+    options = [option_name(name) for name in hint.options if name not in _SUFFIXES]
+    if hint.command:
+        yield " ".join([shlex.join(["dearig", *hint.command]), *options])
+    else:
+        yield from options
 
 
 def print_line(console: Console, text: str, style: str | None = None) -> None:

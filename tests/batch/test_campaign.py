@@ -17,7 +17,7 @@ from dearig.batch.forecast import foresee, survey
 from dearig.batch.journal import JOURNAL, REQUESTS
 from dearig.batch.queue import Queue
 from dearig.batch.watching import seen
-from dearig.cli.hints import with_hints
+from dearig.cli.output import with_hints
 from dearig.config.modelfile import save_model
 from dearig.errors import DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD

@@ -8,8 +8,8 @@ import itertools
 import pytest
 from typer.main import get_command
 
-from dearig.cli.hints import option_name, with_hints
 from dearig.cli.main import app
+from dearig.cli.output import option_name, with_hints
 from dearig.errors import InputError, Note
 from tests.test_errors import modules
 from tests.tools.command import dearig
