@@ -110,7 +110,7 @@ def test_on_a_card_only_the_sequence_of_a_recording_is_repeated(tmp_path: Path, 
         answer = dearig("record", "--like", run, "--rig", address, *asked, "--out", out)
         peaks = [abs(change.wire) for change in card.device.history()]
     if given == "none":
-        refused(answer, "only the sequence of", "give the rig's own file with --rig-file")
+        refused(answer, "only the sequence of", "give the rig's own file (--rig-file)")
     elif given == "lower-limit":
         refused(answer, "limits of the rig file")
     if given != "rig-file":
