@@ -205,6 +205,7 @@ def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:
 
 def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
     """``outcome`` for ``--json`` of diagnose, in the units that the keys end with."""
+    # One piece: the document key by key, as the page on JSON lists it.
     finding, shown = outcome.finding, SHOWN[outcome.kind]
     before, after = outcome.before, outcome.after
     experiment = outcome.experiment

@@ -1,4 +1,7 @@
-"""Every effect: at its neutral values nothing, elsewhere what its physics says."""
+"""Every effect: at its neutral values nothing, elsewhere what its physics says.
+
+One piece: a short test for each effect, on the same films.
+"""
 
 import functools
 import math
