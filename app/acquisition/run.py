@@ -187,7 +187,10 @@ def record(
                 model_toml=overlay.toml if overlay is not None else "",
                 configuration=options.configuration,
                 seed=options.seed if is_simulated(address) else None,
-                provenance={} if loop is None else {"feedback": loop.toml()},
+                provenance={
+                    **options.provenance,
+                    **({} if loop is None else {"feedback": loop.toml()}),
+                },
             )
             writer = RecordingWriter(
                 out, identity, rate, waveform.samples, metadata,

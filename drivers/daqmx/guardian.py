@@ -94,7 +94,10 @@ class Guardian(Protocol):
         ...
 
     def arm(self) -> None:
-        """Start to watch: silence means a frozen run. Raises ``RigError`` without an answer."""
+        """Start to watch: silence means a frozen run.
+
+        Raises ``RigError`` without an answer, and where it has acted and was not disarmed since.
+        """
         ...
 
     def beat(self) -> bool:
@@ -110,7 +113,7 @@ class Guardian(Protocol):
         ...
 
     def disarm(self) -> None:
-        """Stop watching: the output is at 0 V."""
+        """Stop watching: the output is at 0 V. After a take-over the card is released."""
         ...
 
     def take_over(self) -> TakeOver:
@@ -208,7 +211,10 @@ class GuardianProcess:
         return tuple(self._ready["refused"]) if self._ready else ()
 
     def arm(self) -> None:
-        """Start to watch: silence means a frozen run. Raises ``RigError`` without an answer."""
+        """Start to watch: silence means a frozen run.
+
+        Raises ``RigError`` without an answer, and where it has acted and was not disarmed since.
+        """
         with self._news:
             self._report = None
         if not self._ask("arm"):
@@ -217,6 +223,9 @@ class GuardianProcess:
                 f"output to 0 V if this program died; start the run again"
             )
         self._guards = True
+        acted = self.report()
+        if acted is not None:
+            raise RigError(f"the card is held at 0 V: {acted.sentence}")
 
     def beat(self) -> bool:
         """Report that the run is alive; returns False if the guardian is not. Never blocks."""
@@ -258,10 +267,12 @@ class GuardianProcess:
             return self._report
 
     def disarm(self) -> None:
-        """Stop watching: the output is at 0 V."""
-        if self._guards:
-            self._guards = False
+        """Stop watching: the output is at 0 V. After a take-over the card is released."""
+        if self.report() is not None:
+            self._ask("disarm")
+        elif self._guards:
             self._send("disarm")
+        self._guards = False
 
     def take_over(self) -> TakeOver:
         """Request 0 V now. Raises ``RigError`` where the guardian does not set it."""

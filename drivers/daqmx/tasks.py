@@ -225,6 +225,13 @@ class ClockedTasks:
         calls.extend(partial(clear, task) for task in (enable, watchdog) if task is not None)
         self._all(calls)
 
+    def forget(self) -> None:
+        """Clear every task, and leave output and enable line as they are. Raises as ``close``."""
+        enable, watchdog = self._enable, self._watchdog
+        self._enable = self._watchdog = None
+        rest = [partial(clear, task) for task in (enable, watchdog) if task is not None]
+        self._all([self.release, *rest])
+
     def close(self) -> None:
         """Clear every task.
 
