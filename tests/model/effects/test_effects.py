@@ -1,4 +1,7 @@
-"""Every effect: at its neutral values nothing, elsewhere what its physics says."""
+"""Every effect: at its neutral values nothing, elsewhere what its physics says.
+
+One piece: a short test for each effect, on the same films.
+"""
 
 import functools
 import math
@@ -349,8 +352,6 @@ SHOWN = {
         / (np.power(1.0 + 30.0 / p["onset"], p["exponent"]) - 1.0)
     ),
     "sensor double lag": shown_by_two_lags,
-    "wandering drift": shown_by_walk,
-    "restless drift": shown_by_walk,
     "fitful drift": shown_by_walk,
     "sudden change of reading": lambda p, t: (
         moved(t)[0] + p["jump"] * np.clip((t - p["moment"]) / 0.02 + 0.5, 0.0, 1.0)

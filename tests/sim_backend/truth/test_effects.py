@@ -394,6 +394,7 @@ def test_every_stage_gives_the_velocity_of_its_displacement():
 @pytest.mark.parametrize("seed", range(8))
 def test_the_equation_of_motion_is_the_one_that_is_written(seed):
     """Term by term from the docstrings, in a state drawn by chance."""
+    # One piece: the terms of one equation.
     numbers, generator = everything(), np.random.default_rng(seed)
     h, rest = numbers.hidden, film.rest_stretch(numbers)
     state = numbers.at_rest(rest)
