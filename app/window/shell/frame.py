@@ -34,6 +34,7 @@ from dearig.window.follow.page import FollowPage
 from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.stop_keys import StopKeys
 from dearig.window.kit.theme import DARK, LIGHT, SPACE, apply, system_theme
+from dearig.window.kit.wheel_guard import WheelGuard
 from dearig.window.kit.widgets import label, plain_tip
 from dearig.window.recordings.library import shared_library
 from dearig.window.recordings.page import RecordingsPage
@@ -83,6 +84,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.session = session
         self.setWindowTitle("dearig[*]")  # Qt shows a mark there while something is not saved
+        self.wheel_guard = WheelGuard(self)  # before any field is shown
         self.planner = Planner(session, self)
         self.compilation = Compilation(self)
         self.library = shared_library(session)  # lists the folder while the window is made
