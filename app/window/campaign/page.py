@@ -329,6 +329,8 @@ class CampaignPage(QWidget):
         run, stage = self._queue.running, self._stage
         if self._thread is None:
             self.controls.present.setText("")
+        elif run is not None and self._runner.status.state is HighVoltage.UNKNOWN:
+            self.controls.present.setText(f"{run.name} · the output is unknown, the run is ending")
         elif run is not None:
             self.controls.present.setText(f"{run.name} · {stage.partition(', ')[2] or stage}")
         else:
@@ -339,8 +341,10 @@ class CampaignPage(QWidget):
         thread = self._thread
         now = None if thread is None or thread.live is None else thread.live.now()
         status = self._runner.status
-        self.controls.show_numbers(now, status.live)
-        if now is not None:
+        # between two runs there is no number of this moment
+        self.controls.show_numbers(now if status.live else None)
+        self._show_present()
+        if now is not None and status.live:
             monitor = now.values.get("monitor", float("nan"))
             status.show_reading(Reading(monitor, now.samples / now.rate, now.total / now.rate))
 
@@ -366,7 +370,7 @@ class CampaignPage(QWidget):
         if self._folder is not None and self._queue.runs:
             self._fix_plan()
             self._show_queue()
-        self.controls.show_numbers(None if thread.live is None else thread.live.now(), False)
+        self.controls.show_numbers(None)
         self._show_present()
         last = [run for run in self._queue.listed if run.state == DONE and run.recording]
         if last and self._folder is not None:
@@ -428,7 +432,7 @@ class CampaignPage(QWidget):
         self.summary.show_text("")
         self.message.show_text("")
         self.controls.forget_proposal()
-        self.controls.show_numbers(None, False)
+        self.controls.show_numbers(None)
         self.plan.restore(toml, TextFile("plan", toml, None, survey_folder))
 
     @Slot()
@@ -493,7 +497,7 @@ class CampaignPage(QWidget):
             return  # the change of the state comes here again
         controls.arm.setEnabled(ready and armed == runner.armed)
         controls.arm.setChecked(armed)
-        controls.start.setEnabled(ready and armed)
+        controls.start.setEnabled(ready and armed and runner.status.may_start)
         controls.set_editable(not session.running)
         controls.paced.setVisible(is_simulated(session.address))
         controls.show_halt("" if running else self._queue.halted)
@@ -531,6 +535,9 @@ class CampaignPage(QWidget):
         controls.operator.setText(session.operator)
         controls.arm.clicked.connect(self._arm)
         controls.start.clicked.connect(self.start)
+        for step in (controls.arm, controls.start):
+            step.dropped.connect(session.message)
+        self._runner.status.start_opened.connect(self._refresh)
         controls.pause.clicked.connect(lambda: self.wish(("pause", "")))
         controls.go_on.clicked.connect(lambda: self.wish(("continue", "")))
         controls.end.clicked.connect(lambda: self.wish(("end", "")))
@@ -566,7 +573,7 @@ class CampaignPage(QWidget):
         self.summary = Message()
         self.message = Message()
         self.table = CampaignTable(self._session)
-        self.controls = CampaignControls()
+        self.controls = CampaignControls(self._runner.status)
         return result_side(
             self.headline, (self.open_button, self.new_button, self.report_button),
             (self.summary, self.message), self.table, self.controls,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtGui import QFont, QFontMetrics
 from PySide6.QtWidgets import (
@@ -93,7 +95,7 @@ class HighVoltageBar(QFrame):
             QFontMetrics(self.monitor.font()).horizontalAdvance("-10.00 kV")
         )
         self.monitor.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.time = label("", "muted", "Time in the sequence, of its whole length")
+        self.time = label("", "muted", "Time in the sequence, or when the monitor was read")
         self.detail = label("")
         self.detail.setWordWrap(True)  # "switch the amplifier off" must not be cut
         self.detail.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
@@ -121,6 +123,7 @@ class HighVoltageBar(QFrame):
         rows.addLayout(row)
         rows.addLayout(latched)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.badge.painted.connect(status.painted)
         self.stop_button.pressed.connect(self.stop_pressed)
         self.acknowledge_button.clicked.connect(self._ask_name)
         status.changed.connect(self._refresh)
@@ -147,14 +150,9 @@ class HighVoltageBar(QFrame):
         self.detail.setText(status.words)
         self.detail.setToolTip(plain_tip(status.words))
         label_stop(self.stop_button, status.state)
-        reading = status.reading
-        if reading is None:
-            self.monitor.setText("— kV")
-            self.time.setText("")
-        else:
-            self.monitor.setText(kilovolts(reading.monitor))
-            of = f"{reading.seconds:.1f} of {reading.total:.1f} s"
-            self.time.setText(of if status.live else f"last sample,\n{reading.seconds:.2f} s")
+        volts, belongs_to = status.number
+        self.monitor.setText("— kV" if math.isnan(volts) else kilovolts(volts))
+        self.time.setText(belongs_to)
         set_role(self.monitor, "" if status.live else "muted")
         alarm = status.alarm
         self.alarm.setVisible(alarm is not None)

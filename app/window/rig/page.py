@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QSignalBlocker, Qt, Slot
+from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeySequence, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 
 from dearig.acquisition.check import CheckOutcome, check_rig
 from dearig.acquisition.rigs import is_simulated
+from dearig.config.rigfile import RigFile
 from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values
 from dearig.config.toml_edit import with_key
 from dearig.config.toml_input import read_text
@@ -56,6 +57,7 @@ class RigPage(QWidget):
 
     title = "Rig"
     shortcut = "Ctrl+1"
+    output_read = Signal(object)  #: state of the output that a check has read
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -130,7 +132,7 @@ class RigPage(QWidget):
     def check(self) -> None:
         """Check the instruments; the output stays at 0 V."""
         address, rig_file = self.session.address, self.session.rig_file
-        self._checks.start(lambda: check_rig(address, rig_file))
+        self._checks.start(lambda: (rig_file, check_rig(address, rig_file)))
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Check a simulated rig when the page is shown; a real one waits for the button."""
@@ -139,9 +141,13 @@ class RigPage(QWidget):
             self.check()
 
     @Slot(object)
-    def _checked(self, outcome: CheckOutcome) -> None:
-        self.outcome = outcome if outcome.rig == self.session.address else None
+    def _checked(self, answer: tuple[RigFile, CheckOutcome]) -> None:
+        (rig_file, outcome), session = answer, self.session
+        is_present = outcome.rig == session.address and rig_file is session.rig_file
+        self.outcome = outcome if is_present else None
         self._show_outcome()
+        if is_present and outcome.output is not None:
+            self.output_read.emit(outcome.output)
 
     @Slot(bool)
     def _checking(self, busy: bool) -> None:

@@ -92,7 +92,7 @@ class MainWindow(QMainWindow):
         self.sequence_page = SequencePage(session)
         self.run_page = RunPage(session)
         self.campaign_page = CampaignPage(session, self.run_page.runner)
-        self.stop_keys = StopKeys(self.run_page.stop, lambda: session.busy, self)
+        self.stop_keys = StopKeys(self._stop_by_key, lambda: session.busy, self)
         self._guide: Guide | None = None
         self._closing = False
         self._by_signal = False  # closed by a signal: nobody is there to be asked
@@ -212,7 +212,7 @@ class MainWindow(QMainWindow):
         self._closing = True
         if runner.running:
             # the window shows the ramp, and closes when the run has ended
-            runner.stop()
+            runner.stop("the end of the window")
             event.ignore()
             return
         if not self._by_signal and not may_close(self, self.session):
@@ -259,7 +259,7 @@ class MainWindow(QMainWindow):
     def _ask_to_close(self) -> bool:
         """Stop the run and return True if the window is to close afterwards."""
         runner = self.run_page.runner
-        runner.stop()
+        runner.stop("closing the window")
         asked = QMessageBox(self)
         campaign = runner.playing is Play.CAMPAIGN
         what = "campaign" if campaign else "run"
@@ -359,7 +359,7 @@ class MainWindow(QMainWindow):
 
     def _connect(self) -> None:
         session, run = self.session, self.run_page
-        self.bar.stop_pressed.connect(run.stop)
+        self.bar.stop_pressed.connect(lambda: run.runner.stop(f"STOP on {self._title()}"))
         run.runner.state_changed.connect(self._watch_keys)
         run.runner.ended.connect(self._run_ended, Qt.ConnectionType.QueuedConnection)
         session.recovery.changed.connect(self._unsaved_changed)
@@ -368,6 +368,7 @@ class MainWindow(QMainWindow):
         run.show_recording.connect(self._show_recording)
         session.rig_changed.connect(self._rig_or_folder_changed)
         session.folder_changed.connect(self._rig_or_folder_changed)
+        self.rig_page.output_read.connect(run.runner.status.set_read_at_rest)
         session.message.connect(self.status.setText)
         self.compilation.running_changed.connect(self.planner.hold)
         self.compilation.failed.connect(lambda words: run.alarms.add("warning", words))
@@ -381,6 +382,13 @@ class MainWindow(QMainWindow):
         session.blocks_changed.connect(lambda: self.banners.show_blocks(session.blocks))
         self.banners.show_blocks(session.blocks)
         self._rig_or_folder_changed()
+
+    def _stop_by_key(self, key: str) -> None:
+        self.run_page.runner.stop(f"key {key} on {self._title()}")
+
+    def _title(self) -> str:
+        """Return the title of the page that is shown."""
+        return list(_PAGES.values())[self.list.currentRow()].title
 
     @Slot()
     def _watch_keys(self) -> None:

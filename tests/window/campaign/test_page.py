@@ -30,6 +30,7 @@ from dearig.window.run.runner import Play, Runner
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import TextFile
 from dearig.window.shell.frame import MainWindow
+from tests.window.conftest import press
 from tests.window.run.test_stories import click
 
 _PATIENCE = 120_000  # ms; of a machine that may be busy
@@ -89,8 +90,8 @@ def states(page: CampaignPage) -> list[str]:
 
 
 def begin(qtbot: QtBot, page: CampaignPage) -> None:
-    click(qtbot, page.controls.arm)
-    click(qtbot, page.controls.start)
+    press(qtbot, page.controls.arm)
+    press(qtbot, page.controls.start)
 
 
 def ended(qtbot: QtBot, runner: Runner) -> None:
@@ -162,7 +163,7 @@ def test_what_is_refused_stands_in_the_table_and_nothing_can_be_armed(
 def test_an_armed_batch_is_that_which_was_declared_and_no_run(
     qtbot: QtBot, page: CampaignPage, runner: Runner, session: Session
 ) -> None:
-    click(qtbot, page.controls.arm)
+    press(qtbot, page.controls.arm)
     assert runner.armed_for(Play.CAMPAIGN)
     assert not runner.armed_for(Play.RUN)
     assert not runner.arm(True, Play.RUN)
@@ -170,7 +171,7 @@ def test_an_armed_batch_is_that_which_was_declared_and_no_run(
     assert not runner.armed
     qtbot.keyClick(page, Qt.Key.Key_F5)
     assert runner.armed_for(Play.CAMPAIGN)
-    runner.stop()
+    runner.stop("a test")
     assert not runner.armed
     # the survey of a plan that was changed while it was made
     found = page._survey
@@ -184,7 +185,7 @@ def test_an_armed_batch_is_that_which_was_declared_and_no_run(
     assert runner.arm(True, Play.RUN)
     assert not page.controls.arm.isEnabled()
     assert "A run is armed" in page.controls.blocked.text()
-    runner.stop()
+    runner.stop("a test")
 
 
 def test_the_queue_is_paused_reordered_cut_and_ended(
@@ -221,7 +222,7 @@ def test_stop_ends_run_and_campaign_at_zero_and_it_goes_on_later(
     page.controls.paced.setChecked(True)
     begin(qtbot, page)
     qtbot.waitUntil(lambda: far(page, 0.5), timeout=_PATIENCE)
-    runner.stop()
+    runner.stop("a test")
     assert runner.state is HighVoltage.RAMPING
     ended(qtbot, runner)
     assert runner.state is HighVoltage.CONFIRMED
@@ -327,13 +328,13 @@ def test_the_window_closes_in_a_campaign_at_zero_and_the_journal_goes_on(
     window.show_page(page)
     surveyed(qtbot, page)
     page.controls.paced.setChecked(True)
-    click(qtbot, page.controls.arm)
+    press(qtbot, page.controls.arm)
     window.show_page(window.run_page)
     qtbot.keyClick(window, Qt.Key.Key_F6)  # what is armed is no run
     assert not runner.running
     assert not window.run_page.arm_button.isEnabled()
     window.show_page(page)
-    click(qtbot, page.controls.start)
+    press(qtbot, page.controls.start)
     qtbot.waitUntil(lambda: far(page, 0.5), timeout=_PATIENCE)
     window.show_page(window.run_page)
     assert "a campaign goes on" in window.run_page.blocked.text()

@@ -19,6 +19,7 @@ from dearig.window.follow.hold_jobs import measure_hold
 from dearig.window.follow.page import FollowPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from tests.window.conftest import press
 from tests.window.follow.test_page import Here, words
 from tests.window.run.test_stories import click, play
 
@@ -102,7 +103,7 @@ def test_a_hold_is_checked_armed_on_run_watched_and_measured(
     # the newest answer stands until another run is armed, or the hold is removed
     run._refresh()
     assert "error" in run.hold_state.text()
-    click(qtbot, run.arm_button)
+    press(qtbot, run.arm_button)
     qtbot.waitUntil(lambda: "Feedback holds 0.3 mm" in run.hold_state.text(), timeout=_PATIENCE)
     session.set_notes("Ada", "another film", "")
     run._update_readouts()

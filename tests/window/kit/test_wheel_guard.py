@@ -20,8 +20,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from dearig.window.imports.dialog import ImportDialog
-from dearig.window.shell.frame import MainWindow
 from dearig.window.session.state import Session
+from dearig.window.shell.frame import MainWindow
 from tests.window.imports.test_dialog import Here, settled
 
 FIELDS = (QAbstractSpinBox, QComboBox, QAbstractSlider, QTabBar)
