@@ -5,6 +5,8 @@ There is one ``HighVoltageStatus``; the bar of the main window and the Run page 
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import json
 import logging
 import math
@@ -12,12 +14,13 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QLockFile, QObject, Qt, QTimer, Signal, Slot
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.output_state import Known, OutputState
 from dearig.window.high_voltage.responsiveness import REACTION, Responsiveness
 from dearig.window.high_voltage.state import HighVoltage, kilovolts, state_at_rest
+from dearig.window.session.recovery import lock_of, unsaved_folder
 from dearig.window.session.settings import kept_text
 from dearig.window.session.state import Session
 
@@ -48,8 +51,17 @@ class LatchedAlarm:
 
     @property
     def text(self) -> str:
-        """The alarm in one sentence, with its time of day."""
-        return f"{self.headline} at {_clock(self.at)}: {self.sentence}"
+        """The alarm in one sentence, with its time of day and the rig where that is real."""
+        return f"{self.headline}{self._where} at {_clock(self.at)}: {self.sentence}"
+
+    @property
+    def summary(self) -> str:
+        """The headline with rig and time of day."""
+        return f"{self.headline}{self._where} at {_clock(self.at)}"
+
+    @property
+    def _where(self) -> str:
+        return "" if is_simulated(self.address) else f" on {self.address}"
 
 
 @dataclass(frozen=True)
@@ -101,6 +113,7 @@ class HighVoltageStatus(QObject):
         self._ticks.timeout.connect(self._tick)
         self.reading: Reading | None = None
         self.run_number = 0
+        self._lock: QLockFile | None = None  # while a run goes on
         self.alarm: LatchedAlarm | None = None
         session.rig_changed.connect(self._rig_changed)
         self._restore()
@@ -252,6 +265,9 @@ class HighVoltageStatus(QObject):
 
     def run_begins(self) -> None:
         """Keep a note of the run, for a start of the program after this one has died in it."""
+        if not is_simulated(self._session.address):
+            self._lock = self._lock_of(self._session.address)
+            self._lock.tryLock(0)
         self._keep(
             LatchedAlarm(
                 # shown with the time that follows it, which is that of the start
@@ -265,6 +281,9 @@ class HighVoltageStatus(QObject):
     def run_ended(self, alarm: LatchedAlarm | None) -> None:
         """Latch ``alarm``; None for a run that ended as it should."""
         self._keep(alarm)
+        if self._lock is not None:
+            self._lock.unlock()
+            self._lock = None
         self._latch(alarm)
 
     def acknowledge(self, name: str) -> LatchedAlarm | None:
@@ -275,6 +294,7 @@ class HighVoltageStatus(QObject):
         log.warning("%s acknowledged the alarm: %s", name.strip(), alarm.text)
         self._keep(None)
         self._latch(None)
+        self._restore()  # another rig may have left one too
         self.acknowledged.emit(name.strip())
         return alarm
 
@@ -285,8 +305,8 @@ class HighVoltageStatus(QObject):
         else:
             self._session.block(
                 _BLOCK,
-                f"{alarm.headline} at {_clock(alarm.at)}: look at the rig, then acknowledge the "
-                f"alarm in the bar at the top",
+                f"{alarm.summary}: look at the rig, then acknowledge the alarm in the bar at the "
+                f"top",
             )
         self._refresh()
 
@@ -338,11 +358,21 @@ class HighVoltageStatus(QObject):
             self._session.settings.sync()  # the program may die in the next moment
 
     def _restore(self) -> None:
-        """Latch what an earlier start of the program has left for this rig."""
-        address = self._session.address
-        kept = kept_text(self._session.settings, f"{_KEY}/{address}")
-        if not kept or is_simulated(address):
+        """Latch what an earlier start of the program has left: for this rig, else for another."""
+        settings = self._session.settings
+        settings.beginGroup(_KEY)
+        left = [address for address in settings.childKeys() if not is_simulated(address)]
+        settings.endGroup()
+        for address in sorted(left, key=lambda address: address != self._session.address):
+            lock = self._lock_of(address)
+            if not lock.tryLock(0):  # its program goes on
+                continue
+            lock.unlock()
+            self._latch_kept(address)
             return
+
+    def _latch_kept(self, address: str) -> None:
+        kept = kept_text(self._session.settings, f"{_KEY}/{address}")
         try:
             alarm = LatchedAlarm(**json.loads(kept))
         except (TypeError, ValueError):
@@ -353,6 +383,13 @@ class HighVoltageStatus(QObject):
         if alarm.known != Known.CONFIRMED.value:
             self._output, self._address = OutputState(Known.UNKNOWN, alarm.at), address
         self._latch(alarm)
+
+    def _lock_of(self, address: str) -> QLockFile:
+        """Return the lock that a window holds while it plays on the rig at ``address``."""
+        folder = unsaved_folder(self._session.settings).parent / "playing"
+        with contextlib.suppress(OSError):  # a folder that cannot be made locks nothing
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return lock_of(folder / hashlib.sha256(address.encode()).hexdigest()[:16])
 
 
 def _now() -> float:

@@ -13,7 +13,7 @@ from dearig.window.high_voltage.bar import label_stop, stop_button
 from dearig.window.high_voltage.state import HighVoltage, HighVoltageBadge
 from dearig.window.high_voltage.status import HighVoltageStatus
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import Message, Readout, card, label
+from dearig.window.kit.widgets import ElidedLabel, Message, Readout, card, label, set_role
 from dearig.window.run.live import RunSnapshot
 from dearig.window.session.state import Session
 
@@ -126,6 +126,9 @@ class RunControls(QWidget):
             step.setMinimumHeight(40)
             steps.addWidget(step)
         column.addLayout(steps)
+        self.rig = ElidedLabel()  # that is in force
+        set_role(self.rig, "muted")
+        column.addWidget(self.rig)
         self.blocked = Message()  # why the rig cannot be armed
         column.addWidget(self.blocked)
         column.addWidget(self.stop_button)
@@ -220,6 +223,8 @@ class RunControls(QWidget):
 
     @Slot()
     def _rig_changed(self) -> None:
+        session = self._session
+        self.rig.show_text(f"{session.address} with {session.rig_name}")
         self._room_group.setVisible(self._session.rig_file.thermohygrometer is not None)
 
     def show_models(self) -> None:

@@ -397,7 +397,10 @@ class MainWindow(QMainWindow):
     @Slot()
     def _rig_or_folder_changed(self) -> None:
         folder = self.session.folder
-        self.rig_and_folder.setText(f"rig {self.session.address}   ·   {folder.name or folder}  ")
+        session = self.session
+        self.rig_and_folder.setText(
+            f"rig {session.address}, {session.rig_name}   ·   {folder.name or folder}  "
+        )
         self.rig_and_folder.setToolTip(plain_tip(f"Folder of the recordings: {folder}"))
 
     @Slot(int)
