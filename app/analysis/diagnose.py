@@ -16,8 +16,8 @@ from dearig.analysis.experiment import separating_experiment
 from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
+    Evaluation,
     SeparatingExperiment,
-    Stand,
     covariance_table,
     pooled_rms,
 )
@@ -32,13 +32,13 @@ from dearig.analysis.readings.early_ends import choose
 from dearig.analysis.readings.quality import check_enough, extrapolated, few_data, inspect
 from dearig.analysis.readings.record import (
     Source,
-    air_sentences_of,
+    air_texts_of,
     as_record,
     check_named_once,
     compare,
-    noise_sentences,
+    noise_texts,
     open_all,
-    room_sentences,
+    room_texts,
 )
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -312,9 +312,9 @@ def _prepared(
         for r in (*recordings, *others)
         for sentence in inspect(r, settings.drive, to_fit=r in recordings).findings
     ]
-    said += noise_sentences((*recordings, *others))
-    said += room_sentences((*recordings, *others))
-    said += air_sentences_of(recordings)
+    said += noise_texts((*recordings, *others))
+    said += room_texts((*recordings, *others))
+    said += air_texts_of(recordings)
     said += extrapolated(recordings, others, settings.drive)
     films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
     if len(films) > 1:
@@ -369,7 +369,7 @@ def _outcome(
     if not finding.steps:
         models = [finding.baseline, finding.final]
     stands = tuple(
-        Stand(
+        Evaluation(
             tuple(name for name, _ in stage.model.effects),
             _compared(recordings, stage.of_each(len(recordings)), "train", drive, failed),
             _compared(others, [stage.predicting] * len(others), "validation", drive, failed),
@@ -479,7 +479,7 @@ def _own(
     return {name: of(name) for name in records}
 
 
-def _without_own(stand: Stand, own: dict[str, Own | None]) -> Stand:
+def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
     """Return ``stand`` with each recording's events, and what they leave of untouched ones."""
 
     def of(comparison: Comparison) -> Comparison:
@@ -528,7 +528,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
     def rms(comparisons: Sequence[Comparison]) -> float | None:
         return pooled_rms(comparisons) * shown.error_factor if comparisons else None
 
-    def errors(stand: Stand) -> dict[str, Any]:
+    def errors(stand: Evaluation) -> dict[str, Any]:
         return {
             f"train_rms_{shown.suffix}": rms(stand.train),
             f"validation_rms_{shown.suffix}": rms(stand.validation),

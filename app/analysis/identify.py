@@ -35,9 +35,9 @@ from dearig.analysis.readings.record import (
     as_record,
     check_named_once,
     compare,
-    noise_sentences,
+    noise_texts,
     open_all,
-    room_sentences,
+    room_texts,
 )
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -157,8 +157,8 @@ def identify_recordings(
         quality=(
             *left_out,
             *also_left_out,
-            *noise_sentences((*recordings, *others)),
-            *room_sentences((*recordings, *others)),
+            *noise_texts((*recordings, *others)),
+            *room_texts((*recordings, *others)),
         ),
         few_data=few_data(recordings, drive),
         assumed=assumed_by(recordings, rig_file),

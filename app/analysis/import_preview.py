@@ -16,13 +16,13 @@ from dearig.recording.importers.importing import WRITING, prepare
 from dearig.recording.importers.listing import Content, content_of
 from dearig.recording.importers.quantities.units import Scale
 
-__all__ = ["Trial", "look_into", "try_import", "write_import"]
+__all__ = ["ImportTrial", "preview_file", "try_import", "write_import"]
 
 _COLUMNS = 4000  # of a plot
 
 
 @dataclass(frozen=True)
-class Trial:
+class ImportTrial:
     """A recording that an import would write.
 
     ``curves`` are (time s, value) in the units of a recording, by name, with their extremes kept.
@@ -35,7 +35,7 @@ class Trial:
     said: Imported
 
 
-def look_into(
+def preview_file(
     path: Path,
     names_line: int | None,
     raw: Mapping[str, Scale],
@@ -47,7 +47,7 @@ def look_into(
 
 def try_import(
     path: Path, options: ImportOptions, metadata: RunMetadata, progress: Progress = quiet
-) -> Trial:
+) -> ImportTrial:
     """Return what the import of the file at ``path`` would bring in. Raises ``InputError``."""
     found = prepare(path, options, metadata=metadata, progress=part(progress, 0.0, 1.0 / WRITING))
     columns = found.values.columns
@@ -55,7 +55,7 @@ def try_import(
     curves = {
         name: decimate(time, values, _COLUMNS) for name, values in columns.items() if name != "time"
     }
-    return Trial(
+    return ImportTrial(
         found.values.kind, time.size, float(time[-1] - time[0]), curves, found.imported
     )  # fmt: skip
 

@@ -29,11 +29,11 @@ __all__ = [
     "BranchTrial",
     "Comparison",
     "DiagnoseOutcome",
+    "Evaluation",
     "IdentifyOutcome",
     "Published",
     "SeparatingExperiment",
     "SpringCandidate",
-    "Stand",
     "ValidateOutcome",
     "budget_table",
     "covariance_table",
@@ -221,7 +221,7 @@ class ValidateOutcome:
 
 
 @dataclass(frozen=True)
-class Stand:
+class Evaluation:
     """One model with its ``effects`` on all recordings.
 
     ``train`` were fitted; ``validation`` were not used by any fit or choice.
@@ -274,7 +274,7 @@ class DiagnoseOutcome:
     drive: str
     model: ModelFile
     finding: Diagnosis
-    stands: tuple[Stand, ...]
+    stands: tuple[Evaluation, ...]
     noise: float
     experiment: SeparatingExperiment | None
     experiment_words: str
@@ -323,12 +323,12 @@ class DiagnoseOutcome:
         )
 
     @property
-    def before(self) -> Stand:
+    def before(self) -> Evaluation:
         """The baseline."""
         return self.stands[0]
 
     @property
-    def after(self) -> Stand:
+    def after(self) -> Evaluation:
         """The final model."""
         return self.stands[-1]
 

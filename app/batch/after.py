@@ -18,7 +18,7 @@ from dearig.config.rigfile import RigFile
 from dearig.errors import InputError, Interrupted
 from dearig.progress import Progress, quiet
 
-__all__ = ["Compute", "Computed", "compute", "left_band"]
+__all__ = ["Compute", "Computed", "band_violation", "compute"]
 
 log = logging.getLogger(__name__)
 
@@ -101,7 +101,7 @@ def _model(campaign: Campaign, folder: Path, last_model: str) -> ModelFile | Non
     return None if campaign.model is None else load_model(campaign.model)
 
 
-def left_band(bands: tuple[Band, ...], numbers: dict[str, float]) -> str:
+def band_violation(bands: tuple[Band, ...], numbers: dict[str, float]) -> str:
     """Return a sentence on the first band that a number has left, "" if none has.
 
     A parameter that the data do not determine is not among the numbers, and leaves no band.

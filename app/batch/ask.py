@@ -13,8 +13,8 @@ from dearig.errors import InputError
 __all__ = ["ask"]
 
 
-def ask(folder: Path, wishes: Sequence[tuple[str, str]], by: str = "") -> None:
-    """Append ``wishes`` to the requests of the campaign in ``folder``.
+def ask(folder: Path, requests: Sequence[tuple[str, str]], by: str = "") -> None:
+    """Append ``requests`` to the requests of the campaign in ``folder``.
 
     Each is one of ``REQUEST_KINDS`` and the name of a run, "" where it needs none. Raises
     ``InputError`` for a folder without a campaign, and for a run that does not wait.
@@ -22,7 +22,7 @@ def ask(folder: Path, wishes: Sequence[tuple[str, str]], by: str = "") -> None:
     queue = Queue.of(folder / JOURNAL) if folder.is_dir() else Queue()
     if not queue.runs:
         raise InputError(f"{folder} has no campaign: there is no journal {JOURNAL}")
-    for _, name in wishes:
+    for _, name in requests:
         if not name:
             continue
         run = queue.runs.get(name)
@@ -34,5 +34,5 @@ def ask(folder: Path, wishes: Sequence[tuple[str, str]], by: str = "") -> None:
             )
         if run.state != WAITING:
             raise InputError(f"run {name} is {run.state}; only a run that waits can be moved")
-    for what, name in wishes:
+    for what, name in requests:
         append_line(folder / REQUESTS, {"event": what, "run": name, "by": by})

@@ -19,7 +19,7 @@ from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.plan import plan
 from dearig.acquisition.rigs import is_simulated, kind_of
 from dearig.acquisition.run import RunObserver, RunOptions, record
-from dearig.batch.after import Compute, compute, left_band
+from dearig.batch.after import Compute, band_violation, compute
 from dearig.batch.extremes import write_extremes
 from dearig.batch.forecast import Forecast, foresee
 from dearig.batch.journal import FORMAT, JOURNAL, REQUESTS, Journal, read_lines
@@ -527,7 +527,7 @@ class _Session:
             self._of_run(state),
         )  # fmt: skip
         extremes = "" if self._campaign.is_kept(run) else self._reduce(state, recording)
-        band = left_band(self._campaign.stop_when, found.numbers)
+        band = band_violation(self._campaign.stop_when, found.numbers)
         if band:
             self._halt(f"after run {run.name}: {band}")
         self._end(state, DONE, "; ".join(found.problems), numbers=found.numbers, model=found.model)

@@ -134,7 +134,7 @@ def campaign(
     from dearig.report.pages.campaign import (
         campaign_json,
         forecast_json,
-        forecast_sentences,
+        forecast_texts,
         write_campaign_report,
     )
 
@@ -149,7 +149,7 @@ def campaign(
         with working(json) as (console, progress):
             found = foresee(loaded, settings, out, actuator, film, progress)
         found.check_room(out)
-        print_lines(console, forecast_sentences(loaded, found))
+        print_lines(console, forecast_texts(loaded, found))
         write_result(forecast_json(loaded, found), json)
         return
     faults = read_faults(fault or ())
@@ -206,7 +206,7 @@ def campaign_queue(
     check_files(force, (), json=json)
     if pause and proceed:
         raise InputError("--pause and --continue exclude each other; give one of them")
-    wishes = [
+    requests = [
         *([("pause", "")] if pause else []), *([("continue", "")] if proceed else []),
         *(("skip", name) for name in skip or ()),
         # the last one that is put first is played first
@@ -214,11 +214,11 @@ def campaign_queue(
         *([("end", "")] if end else []),
     ]  # fmt: skip
     console = console_for(json)
-    if wishes:
-        ask(folder, wishes, operator)
-        what = ", ".join(f"{kind} {name}".strip() for kind, name in wishes)
+    if requests:
+        ask(folder, requests, operator)
+        what = ", ".join(f"{kind} {name}".strip() for kind, name in requests)
         print_line(console, f"{folder}: asked to {what}; it takes effect between two runs")
     outcome = seen(folder)
-    if not wishes:
+    if not requests:
         console.print(campaign_runs(outcome))
     write_result(campaign_json(outcome), json)

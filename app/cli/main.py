@@ -104,7 +104,7 @@ def main() -> None:
     _give_matplotlib_a_folder()
     with (
         _printable_output(), log_file.attached() as written, _terminal(),
-        _unexpected_errors_told(written), _library_warnings_logged(),
+        _unexpected_errors_logged(written), _library_warnings_logged(),
     ):  # fmt: skip
         status = _run(written)
         _await_notifications()
@@ -329,7 +329,7 @@ def _tell_unexpected(error: BaseException, written: log_file.LogFile) -> None:
 
 
 @contextmanager
-def _unexpected_errors_told(written: log_file.LogFile) -> Iterator[None]:
+def _unexpected_errors_logged(written: log_file.LogFile) -> Iterator[None]:
     """Tell errors in threads and in Qt's slots too, which no ``except`` reaches."""
     before = sys.excepthook, threading.excepthook, sys.unraisablehook
 

@@ -178,12 +178,12 @@ def _original(sequence: str | None, like: Path | None, rig_file: Path | None) ->
 def _announcer(console: Console, settings: RigFile) -> RunObserver:
     """Return an observer that says, before a run on a card, whether its watchdog is wired."""
     from dearig.acquisition.run import RunObserver
-    from dearig.drivers.daqmx.watchdog import watchdog_words
+    from dearig.drivers.daqmx.watchdog import watchdog_text
 
     class Announcer(RunObserver):
         def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:  # noqa: ARG002
             if identity.address.startswith("daqmx:"):
-                words = watchdog_words(settings.card, identity.simulated)
+                words = watchdog_text(settings.card, identity.simulated)
                 print_line(console, f"hardware watchdog: {words}")
 
     return Announcer()

@@ -113,11 +113,9 @@ def track_table(outcome: TrackOutcome) -> RenderableType:
 
 def trend_tables(trends: Trends) -> RenderableType:
     """Return trends as sentences, the effects, and what to vary next."""
-    from dearig.report.text.trends import effect_table, proposal_sentences, trends_sentences
+    from dearig.report.text.trends import effect_table, proposal_texts, trends_texts
 
-    return _Fitted(
-        [*trends_sentences(trends), effect_table(trends), *proposal_sentences(trends)], ()
-    )
+    return _Fitted([*trends_texts(trends), effect_table(trends), *proposal_texts(trends)], ())
 
 
 def campaign_runs(outcome: CampaignOutcome, most: int = 40) -> RenderableType:
@@ -130,9 +128,9 @@ def campaign_runs(outcome: CampaignOutcome, most: int = 40) -> RenderableType:
 
 def study_rows(table: StudyTable, most: int) -> RenderableType:
     """Return the table of a study of many recordings, at most ``most`` rows of it."""
-    from dearig.report.text.study_table import study_table_rows, study_table_sentences
+    from dearig.report.text.study_table import study_table_rows, study_table_texts
 
-    return _Fitted([*study_table_sentences(table), study_table_rows(table, most)], ())
+    return _Fitted([*study_table_texts(table), study_table_rows(table, most)], ())
 
 
 _RANKED = 6  # candidates of a round that a terminal shows

@@ -24,7 +24,7 @@ __all__ = [
     "LoadSection",
     "RecordingSection",
     "RigFile",
-    "fault_sentence",
+    "fault_text",
     "load_rig_file",
     "write_default",
 ]
@@ -229,10 +229,10 @@ def _sentence(error: ValidationError) -> str:
     first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
     more = len(faults) - 1
     tail = f" ({more} more fault{'s' if more > 1 else ''} after that)" if more else ""
-    return fault_sentence(first) + tail
+    return fault_text(first) + tail
 
 
-def fault_sentence(fault: ErrorDetails) -> str:
+def fault_text(fault: ErrorDetails) -> str:
     """Return one sentence for a fault that pydantic found: the key, its value, what is allowed."""
     # which of several tables it is, counted from 1, is part of the key that is shown
     place = [str(part) for part in fault["loc"] if isinstance(part, str)]

@@ -9,7 +9,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from dearig.config.rigfile import REPEATED, RigFile, fault_sentence
+from dearig.config.rigfile import REPEATED, RigFile, fault_text
 from dearig.config.toml_input import allowed, parse_toml, shown
 from dearig.errors import InputError
 
@@ -91,7 +91,7 @@ def _place(fault: ErrorDetails) -> tuple[str, str]:
 
 def _sentence_at(place: tuple[str, str], fault: ErrorDetails) -> str:
     if place[0] in REPEATED or fault["type"] in ("model_type", "model_attributes_type"):
-        return fault_sentence(fault)
+        return fault_text(fault)
     words = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else ""
     return _sentence(*place, fault["input"], words)
 

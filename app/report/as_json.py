@@ -21,10 +21,10 @@ if TYPE_CHECKING:
         BranchTrial,
         Comparison,
         DiagnoseOutcome,
+        Evaluation,
         IdentifyOutcome,
         Published,
         SpringCandidate,
-        Stand,
         ValidateOutcome,
     )
     from dearig.model.diagnosis.results import Candidate, Stage, Step
@@ -297,7 +297,7 @@ def _names(*groups: tuple[Comparison, ...]) -> list[str]:
     return list(dict.fromkeys(c.name for group in groups for c in group))
 
 
-def _stand_json(stand: Stand) -> dict[str, Any]:
+def _stand_json(stand: Evaluation) -> dict[str, Any]:
     kind = stand.train[0].kind if stand.train else "actuator"
     by_record = {c.name: _measures_json((c,), kind) for c in stand.validation}
     return {

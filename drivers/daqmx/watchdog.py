@@ -5,7 +5,7 @@ from __future__ import annotations
 from dearig.drivers.instruments.findings import Finding, Verdict
 from dearig.drivers.settings import CardSettings
 
-__all__ = ["WATCHDOG", "watchdog_finding", "watchdog_words"]
+__all__ = ["WATCHDOG", "watchdog_finding", "watchdog_text"]
 
 #: Item of the finding.
 WATCHDOG = "hardware watchdog"
@@ -13,7 +13,7 @@ WATCHDOG = "hardware watchdog"
 _NOTHING = "not wired: nothing takes the voltage down if run and guardian die together"
 
 
-def watchdog_words(card: CardSettings, simulated: bool | None) -> str:
+def watchdog_text(card: CardSettings, simulated: bool | None) -> str:
     """Return whether the watchdog is wired and what that means.
 
     ``simulated`` is what the card reports of itself, None if it was not asked.
@@ -36,7 +36,7 @@ def watchdog_finding(
     A real card needs a watchdog or the declaration that there is none. One behind a ``server``
     that was not reached may be simulated.
     """
-    words = watchdog_words(card, simulated)
+    words = watchdog_text(card, simulated)
     verdict: Verdict
     if card.watchdog_s:
         return Finding(instrument, WATCHDOG, words)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from dearig.model.diagnosis.engine import Found, Race
+from dearig.model.diagnosis.engine import Race, SearchResult
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
 from dearig.model.diagnosis.imposed import lateness
@@ -46,7 +46,9 @@ _ITERATIONS = 8  # of the last fits, on every sample
 class Conclusion:
     """One search's end, with the fits that the conclusion adds."""
 
-    def __init__(self, found: Found, fitter: Fitter, without: Callable[[Fit, str], Fit]) -> None:
+    def __init__(
+        self, found: SearchResult, fitter: Fitter, without: Callable[[Fit, str], Fit]
+    ) -> None:
         self.found, self.fitter, self.judge = found, fitter, found.judge
         self._without = without
         noise = self.judge.is_noise(found.baseline)
@@ -217,7 +219,7 @@ class Conclusion:
 
 
 def conclude(
-    found: Found, fitter: Fitter, without: Callable[[Fit, str], Fit], held: bool = False
+    found: SearchResult, fitter: Fitter, without: Callable[[Fit, str], Fit], held: bool = False
 ) -> Diagnosis:
     """Return the diagnosis that a search has ``found``; ``without(fit, name)`` refits."""
     end = Conclusion(found, fitter, without)
@@ -228,7 +230,7 @@ def conclude(
         end.last,
         judge,
         fitter.raw,
-        profiled=fitter.means_about(end.last, found.best.drift),
+        profiled=fitter.thinned_about(end.last, found.best.drift),
         for_others=others,
     )
     steps, rivals = end.steps(final)

@@ -18,7 +18,7 @@ from dearig.model.effects import EFFECTS, Effect
 from dearig.model.readings.environment import recorded_of
 from dearig.model.readings.records import ActuatorRecord
 
-__all__ = ["Found", "Race", "Search"]
+__all__ = ["Race", "Search", "SearchResult"]
 
 _BASELINE_PART = 0.1  # of the progress
 _DRIFT_TURNS = 3  # of fitting the model and the drift's variance in turn
@@ -30,7 +30,7 @@ class Stopped(Exception):  # noqa: N818
     """The operator wants the end."""
 
 
-class Spent(Exception):  # noqa: N818
+class BudgetExhausted(Exception):  # noqa: N818
     """The search has taken the work that it may."""
 
 
@@ -49,7 +49,7 @@ class Race:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """End of a search: the baseline, the best fit, all others by their members, and the races.
 
     ``sought`` are the families of effects that the search knows. ``status`` is ``complete``,
@@ -102,9 +102,9 @@ class Search:
         if self._searching and self.stop():
             raise Stopped
         if self._searching and self.fitter.work.effort > self.settings.effort:
-            raise Spent
+            raise BudgetExhausted
 
-    def run(self) -> Found:
+    def run(self) -> SearchResult:
         """Return what the records lack, or the best of what the work or the operator allowed."""
         baseline = self.keep(self.fitter.baseline(self._of_baseline))
         self.judge = Judge(self.settings, baseline)
@@ -114,7 +114,7 @@ class Search:
             best = self._searched(baseline)
         except Stopped:
             best, status = self._most_probable(), "stopped"
-        except Spent:
+        except BudgetExhausted:
             best, status = self._most_probable(), "budget"
         finally:
             self._searching = False
@@ -124,7 +124,7 @@ class Search:
         if self.fitter.of_actuator:
             sought.add(family_of(DRIFT))
         races = tuple(self.races)
-        return Found(baseline, best, self.fits, races, self.judge, frozenset(sought), status)
+        return SearchResult(baseline, best, self.fits, races, self.judge, frozenset(sought), status)
 
     def _of_baseline(self, stage: str, fraction: float) -> None:
         # searches with and without stiffening springs each count from 0 to 1
@@ -188,7 +188,7 @@ class Search:
             return baseline
         fits = self._raced(baseline, laws)
         self.judge.see([baseline, *fits])
-        if not (fits and self.judge.is_worth(baseline, fits[0])):
+        if not (fits and self.judge.justifies(baseline, fits[0])):
             return baseline
         self._say("hums", baseline, fits[0])
         self.races[-1] = replace(self.races[-1], taken=fits[0])
@@ -224,7 +224,7 @@ class Search:
             if not fits:
                 break
             self.judge.see([best, *fits])
-            worth = self.judge.is_worth(best, fits[0])
+            worth = self.judge.justifies(best, fits[0])
             self._say("grown" if worth else "not grown", best, fits[0])
             if not worth:
                 break

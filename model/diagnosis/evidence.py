@@ -135,7 +135,7 @@ class Judge:
         """Whether the noise is that of a sensor: the tolerance of a film's model is not white."""
         return hasattr(fit.problem.layout.base, "load")
 
-    def is_worth(self, parent: Fit, fit: Fit) -> bool:
+    def justifies(self, parent: Fit, fit: Fit) -> bool:
         """Whether ``fit`` explains decisively more than ``parent``, which has fewer effects."""
         s = self.settings
         left = max(parent.cost - 1.0, 1e-9)

@@ -47,7 +47,9 @@ DRIFT = "drift"
 _GAIN = 0.5  # of chi-square: what is left to gain changes no choice, whose odds are 12
 _GAIN_PART = 1e-3  # of chi-square: the same, where more than twice the noise's power is left
 _POLISHED = 2.0  # mean square over noise: what leaves more only polishes a misfit
-_SAID_PART = 0.01  # of chi-square: the error of a model without effects is said to half a per cent
+REPORTED_TOLERANCE = (
+    0.01  # of chi-square: the error of a model without effects is said to half a per cent
+)
 _NO_WEIGHT = 1e-6  # of the typical one: what the bounds of a descent leave of a weight at 0
 _AT_ONCE = 1e-3  # s: a branch that relaxes faster than any record shows
 _BASELINE_STARTS = 5  # of the global search
@@ -416,7 +418,7 @@ class Fitter:
         scaled = drift * sum(ratios) / len(ratios)
         return self.problem(model, scaled, kernel.CAREFUL, full=True, layout=layout)
 
-    def means_about(self, careful: Fit, drift: float) -> WhitenedProblem:
+    def thinned_about(self, careful: Fit, drift: float) -> WhitenedProblem:
         """Return the thinned records, moved so that their optimum is that of a ``careful`` fit.
 
         ``drift`` is that of the thinned records.
@@ -492,13 +494,13 @@ class Fitter:
         drag[shortest], drag[modulus] = _AT_ONCE, own[modulus] * own[shortest] / _AT_ONCE
         starts = np.clip(layout.coordinates(np.array([own, drag])), layout.lower, layout.upper)
         wide = [
-            self._from_springs(problem, lambda *_: None, _SAID_PART),
+            self._from_springs(problem, lambda *_: None, REPORTED_TOLERANCE),
             *self.map(
                 lambda x: self.descend(problem, x, _BASELINE_ITERATIONS, sure=True), list(starts)
             ),
         ]
         best = min(wide, key=lambda f: f.cost)
-        fixed, gain = best.fixed, _gain(best, _SAID_PART)
+        fixed, gain = best.fixed, _gain(best, REPORTED_TOLERANCE)
         found = descend(problem, best.x, fixed, _BASELINE_ITERATIONS, gain, 1e-4, quick=True)
         none = np.zeros_like(fixed)
         freed = descend(problem, found.x, none, _BASELINE_ITERATIONS, gain, quick=True)

@@ -10,7 +10,7 @@ import numpy as np
 from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.thinning import thinned
 from dearig.model.readings.noise import about_rest, noise_at_rest, rounding, tails_of
-from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, bridged, counted
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, counted, interpolated
 from dearig.model.readings.spikes import spikes
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
@@ -39,12 +39,12 @@ _CROWD = 2  # of the next two on either side far off: by chance at one reading i
 def prepared(record: Record, model: Actuator | Strip) -> Record:
     """Return the record at a rate that is enough, with its noise read again from its lead-in.
 
-    Masked readings are bridged: the regression imposes the measured motion on the springs.
+    Masked readings are interpolated: the regression imposes the measured motion on the springs.
     """
     thin = _thinned(record, model)
     if isinstance(thin, FilmRecord):
         return thin
-    return replace(thin, displacement=bridged(thin.time, thin.displacement, thin.valid))
+    return replace(thin, displacement=interpolated(thin.time, thin.displacement, thin.valid))
 
 
 def _thinned(record: Record, model: Actuator | Strip) -> Record:
@@ -93,20 +93,20 @@ def with_model_error(record: Record) -> Record:
 
 
 def without_spikes(record: Record, residual: np.ndarray) -> Record:
-    """Return ``record`` without single readings that are far off a model, masked and bridged.
+    """Return ``record`` without single readings that are far off a model, masked and interpolated.
 
     ``residual`` (N,) is measured less model in m. Where the film rings, no smooth curve through the
     readings shows a spike, but the model knows how it rings.
     """
     if not isinstance(record, ActuatorRecord) or at_rest(record).size < _QUIET_MIN:
         return record
-    left = bridged(record.time, residual, record.valid)
+    left = interpolated(record.time, residual, record.valid)
     found = spikes(record.time, left, record.drive.voltage**2, record.lead_in)
     if not found.any():
         return record
     valid = ~found if record.valid is None else record.valid & ~found
     spiky = replace(record, valid=valid)
-    change = np.where(found, bridged(record.time, left, valid) - left, 0.0)
+    change = np.where(found, interpolated(record.time, left, valid) - left, 0.0)
     return replace(spiky, displacement=record.displacement + change)
 
 

@@ -96,7 +96,7 @@ def _entered(fitter: Fitter, parent: Fit, candidate: Candidate, iterations: int)
             shifted[~parent.fixed] += start.shift
         beside.append(fitter.start_of(problem, shifted, start.shifted))
     # and from nothing, in the best shape
-    nothing = _hardly(name, candidate.starts[0].values)
+    nothing = near_neutral(name, candidate.starts[0].values)
     beside.append(fitter.start_of(problem, parent.x, nothing))
     costs = fitter.costs(problem, np.array(anew + beside))
     chosen = (int(np.argmin(costs[: len(anew)])), len(anew) + int(np.argmin(costs[len(anew) :])))
@@ -104,7 +104,7 @@ def _entered(fitter: Fitter, parent: Fit, candidate: Candidate, iterations: int)
     return [fitter.descend(problem, rows[i], iterations) for i in chosen]
 
 
-def _hardly(name: str, values: Sequence[float]) -> tuple[float, ...]:
+def near_neutral(name: str, values: Sequence[float]) -> tuple[float, ...]:
     """Return ``values`` of effect ``name`` with amplitudes next to neutral."""
     return tuple(
         v if p.neutral is None else p.neutral + _TINY * p.typical

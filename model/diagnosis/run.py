@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from dearig.model.diagnosis.conclusion import conclude
-from dearig.model.diagnosis.engine import Found, Search
+from dearig.model.diagnosis.engine import Search, SearchResult
 from dearig.model.diagnosis.fits import Fit, Fitter
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.diagnosis.settings import DiagnosisSettings
@@ -61,7 +61,7 @@ def diagnose(
     as_held = _with_held_voltage(records)
     part = _LAST / 2.0 if as_held else _LAST
 
-    def searched(given: Sequence[Record], first: float) -> tuple[Found, Search]:
+    def searched(given: Sequence[Record], first: float) -> tuple[SearchResult, Search]:
         search = Search(
             Fitter(given, base, settings, workers, others=others),
             lambda stage, fraction: progress(stage, first + part * fraction),
@@ -97,7 +97,7 @@ def _with_held_voltage(records: Sequence[Record]) -> list[Record] | None:
     return [replace(r, drive=replace(r.drive, hold=True)) for r in known]
 
 
-def _may_be_held(found: Found, search: Search, as_held: Sequence[Record]) -> bool:
+def _may_be_held(found: SearchResult, search: Search, as_held: Sequence[Record]) -> bool:
     """Whether a search with a held voltage is worth its time.
 
     It is where the first one leaves something, and where what it has found, or a part of it,
@@ -123,6 +123,6 @@ def _may_be_held(found: Found, search: Search, as_held: Sequence[Record]) -> boo
     return False
 
 
-def _score(found: Found, fit: Fit) -> float:
+def _score(found: SearchResult, fit: Fit) -> float:
     """Return the criterion of ``fit`` with the prior odds of its effects."""
     return found.judge.criterion(fit) + found.judge.settings.odds * len(fit.members)

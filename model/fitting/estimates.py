@@ -98,7 +98,7 @@ def estimates_with_intervals(
         low, high = max(low, lowest), min(high, highest)
         low, high = float(min(low, value)), float(max(high, value))
         determined = is_determined(low, high) and not ends[j]
-        note = "" if determined else _open_words(low, high)
+        note = "" if determined else _open_text(low, high)
         if held[j]:
             note = _J_WORDS if low > 0.0 else "not determined by these data"
         elif ends[j]:
@@ -123,7 +123,7 @@ def is_determined(low: float, high: float) -> bool:
     return low * high > 0.0 and far < math.inf and far / near <= _DETERMINED_RATIO
 
 
-def _open_words(low: float, high: float) -> str:
+def _open_text(low: float, high: float) -> str:
     if low < 0.0 < high:
         return "not distinguishable from 0 with these data"
     if low == 0.0 and math.isinf(high):

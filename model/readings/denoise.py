@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import savgol_filter
 
-__all__ = ["quieted", "reading_noise"]
+__all__ = ["reading_noise", "smoothed"]
 
 _WINDOWS = (81, 41, 21, 11, 7)  # samples
 _AGREES = 1.25  # local RMS of the removed part, over the noise
@@ -35,7 +35,7 @@ def reading_noise(voltage: np.ndarray) -> float:
     return float(np.std(quiet, ddof=1)) if quiet.size >= _QUIET_MIN else noise
 
 
-def quieted(voltage: np.ndarray, noise: float) -> np.ndarray:
+def smoothed(voltage: np.ndarray, noise: float) -> np.ndarray:
     """Return ``voltage`` (N,) V without the ``noise`` V of its readings; edges are kept."""
     out = voltage.copy()
     open_ = np.ones(voltage.size, dtype=bool)

@@ -13,7 +13,7 @@ __all__ = [
     "HUMIDITY",
     "HUMIDITY_SPAN",
     "TEMPERATURE_SPAN",
-    "air_sentences",
+    "air_texts",
     "recorded_of",
 ]
 
@@ -50,7 +50,7 @@ def recorded_of(
     return frozenset(found)
 
 
-def air_sentences(
+def air_texts(
     temperatures: Sequence[float | None], humidities: Sequence[float | None]
 ) -> Iterator[str]:
     """Yield why effects of a recorded humidity or temperature cannot be looked for."""

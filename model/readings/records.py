@@ -10,7 +10,7 @@ import numpy as np
 from dearig.model.errors import ModelError
 from dearig.model.simulation.actuator import Drive
 
-__all__ = ["ActuatorRecord", "FilmRecord", "Record", "bridged", "counted"]
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "interpolated"]
 
 _MATCHING = 10  # iterations; each leaves a third of the error of the one before
 
@@ -224,7 +224,7 @@ class FilmRecord:
 Record = ActuatorRecord | FilmRecord
 
 
-def bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> np.ndarray:
+def interpolated(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> np.ndarray:
     """Return ``values`` (N,) with straight lines across what is not ``valid`` (N,)."""
     if valid is None or not valid.any():
         return values

@@ -20,7 +20,7 @@ from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, assembly
 from dearig.model.film.network import HEAD
 from dearig.model.fitting.search import SMOOTHING
 from dearig.model.kinematics import thinning
-from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, bridged
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, interpolated
 from dearig.model.simulation.actuator import Actuator, at_rest
 from dearig.model.simulation.strip import Strip, unit_stresses
 
@@ -70,7 +70,7 @@ def _of_film(record: FilmRecord, model: Strip) -> MissingStress | None:
     return MissingStress(
         record=record.name,
         time=record.time,
-        stress=bridged(record.time, record.stress - answer.stress, record.valid),
+        stress=interpolated(record.time, record.stress - answer.stress, record.valid),
         stretch=record.stretch,
         rate=np.gradient(record.stretch, record.time),
         voltage=np.zeros_like(record.time),
@@ -102,7 +102,9 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
         network = c[HEAD + MODULUS :: WIDTH] @ parts
         return network + c[INERTIA] * bend, stretch, rate
 
-    residual = bridged(time, record.displacement - record.seen(response.displacement), record.valid)
+    residual = interpolated(
+        time, record.displacement - record.seen(response.displacement), record.valid
+    )
     measured, stretch, rate = lacking(response.displacement + residual)
     predicted, there, _ = lacking(response.displacement)
     late = np.interp(time - record.lag, time, record.drive.voltage)

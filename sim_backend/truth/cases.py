@@ -35,10 +35,10 @@ from dearig.sim_backend.truth.effects import (
     thermal,
 )
 from dearig.sim_backend.truth.film import FilmNumbers
+from dearig.sim_backend.truth.generator_b import dielectric, electric, sensor
+from dearig.sim_backend.truth.generator_b import film as film_stress
+from dearig.sim_backend.truth.generator_b import load as load_forms
 from dearig.sim_backend.truth.plant import TruthPlant
-from dearig.sim_backend.truth.second_hand import dielectric, electric, sensor
-from dearig.sim_backend.truth.second_hand import film as film_stress
-from dearig.sim_backend.truth.second_hand import load as load_forms
 
 __all__ = [
     "FORMS",
@@ -124,7 +124,7 @@ ROOM_FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
     }
 )
 
-#: Forms of the second hand: published laws that neither the model nor the first hand has.
+#: Forms of generator B: published laws that neither the model nor generator A has.
 SECOND_FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
     {
         "amplifier": (electric.tanh_stage, electric.slewing_pair, electric.intercept),

@@ -16,8 +16,8 @@ import numpy as np
 
 from dearig.model.compiled.jit import allocating, jit
 from dearig.model.film.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
-from dearig.sim_backend.truth import second_laws
-from dearig.sim_backend.truth.second_laws import (
+from dearig.sim_backend.truth import generator_b_laws
+from dearig.sim_backend.truth.generator_b_laws import (
     added_stress,
     electrode_charging,
     fastest_decay,
@@ -134,8 +134,8 @@ class Hidden(NamedTuple):
     second_inertia: float = 0.0
     second_frequency: float = 0.0
     second_damping: float = 0.0
-    # laws of the second hand
-    further: second_laws.Second = second_laws.NOTHING
+    # laws of generator B
+    further: generator_b_laws.Second = generator_b_laws.NOTHING
 
 
 _NOTHING = Hidden()
@@ -221,7 +221,7 @@ class FilmNumbers:
         return replace(self, hidden=self.hidden._replace(**changed))
 
     def obeying(self, **numbers: float) -> FilmNumbers:
-        """Return the film with some parameters of the second hand's laws set."""
+        """Return the film with some parameters of generator B's laws set."""
         return replace(
             self, hidden=self.hidden._replace(further=self.hidden.further._replace(**numbers))
         )
@@ -252,7 +252,7 @@ class FilmNumbers:
 
     def at_rest(self, rest: float) -> FilmState:
         """Return the state at stretch ``rest``; in relaxed branches z_i = 0."""
-        more = 0 if self.hidden.further == second_laws.NOTHING else second_laws.STATES
+        more = 0 if self.hidden.further == generator_b_laws.NOTHING else generator_b_laws.STATES
         y = np.zeros(_BRANCH + len(self.times) + more)
         memory = np.zeros(_SLIPPED + len(self.stops))
         y[0] = memory[_START] = memory[_LARGEST] = rest
@@ -264,7 +264,7 @@ class FilmNumbers:
 _BRISTLE, _BOUC, _SECTION_1, _SECTION_2, _WARM_1, _WARM_2, _PATH, _SECOND, _SECOND_RATE = range(
     2, 11
 )
-_BRANCH = 11  # z_1, z_2, ...; then the states of the second hand's laws, if it has any
+_BRANCH = 11  # z_1, z_2, ...; then the states of generator B's laws, if it has any
 # Memory changes at the end of a step only: stretch there, largest stretch, slipped elements
 _START, _LARGEST, _SLIPPED = 0, 1, 2
 

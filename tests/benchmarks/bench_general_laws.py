@@ -3,7 +3,7 @@
 Run as ``python -m tests.benchmarks.bench_general_laws [SEEDS]``. Each law acts along one motion
 (``tests/tools/general_laws.py``). The first table has the simple laws at their typical size, at
 every combination of the starts of their shape parameters. The second has the forms of the simulated
-rigs' second hand, drawn by as many seeds. Both have the smallest and largest RMS of what is left,
+rigs' generator B, drawn by as many seeds. Both have the smallest and largest RMS of what is left,
 of the law's own.
 """
 
@@ -15,14 +15,14 @@ import numpy as np
 
 from dearig.model.effects import EFFECTS
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.sim_backend.truth import second_laws
+from dearig.sim_backend.truth import generator_b_laws
 from dearig.sim_backend.truth.cases import SECOND_FORMS
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers
 from tests.tools.effect_cases import numbers
 from tests.tools.general_laws import approximate, motion, response
 
-_FINER = 10  # parts of a sample in which the second hand's states are integrated
+_FINER = 10  # parts of a sample in which generator B's states are integrated
 
 
 def shapes_of(name: str) -> list[dict[str, float]]:
@@ -52,8 +52,8 @@ def left_by(laws: list[str], target: np.ndarray) -> float:
     )
 
 
-def of_second_hand(effect: TruthEffect) -> np.ndarray | None:
-    """What an effect of the second hand adds along the motion (N,); None if no hook is like it."""
+def of_generator_b(effect: TruthEffect) -> np.ndarray | None:
+    """What an effect of generator B adds along the motion (N,); None if no hook is like it."""
     path = motion()
     if effect.on_voltage is not None:
         out, _ = effect.on_voltage(path.time, path.voltage.copy(), None)
@@ -77,8 +77,10 @@ def along(on_film: Callable[[FilmNumbers], FilmNumbers]) -> np.ndarray:
     if s.booth or s.johnson or s.peak_slope:
         square = path.voltage**2
         pairs = zip(square, path.stretch, strict=True)
-        return np.array([second_laws.permittivity_factor(s, v2, e, rest) - 1.0 for v2, e in pairs])
-    y, dy = np.zeros(second_laws.STATES), np.zeros(second_laws.STATES)
+        return np.array(
+            [generator_b_laws.permittivity_factor(s, v2, e, rest) - 1.0 for v2, e in pairs]
+        )
+    y, dy = np.zeros(generator_b_laws.STATES), np.zeros(generator_b_laws.STATES)
     slipped, out, largest = np.zeros(len(film.stops)), [0.0], rest
     times, moduli = np.array(film.times[len(plain.times) :]), film.moduli[len(plain.moduli) :]
     late = np.zeros(times.size)
@@ -89,7 +91,7 @@ def along(on_film: Callable[[FilmNumbers], FilmNumbers]) -> np.ndarray:
         for part in range(_FINER):
             lam = path.stretch[n - 1] + (part + 1) * travel
             rate = path.rate[n - 1] + (part + 1) / _FINER * (path.rate[n] - path.rate[n - 1])
-            stress = second_laws.added_stress(s, y, 0, lam, rate, rest, dy)
+            stress = generator_b_laws.added_stress(s, y, 0, lam, rate, rest, dy)
             y += h * dy
             strain = np.log(lam / rest)
             late += (strain - late) * -np.expm1(-h / times)
@@ -98,8 +100,8 @@ def along(on_film: Callable[[FilmNumbers], FilmNumbers]) -> np.ndarray:
             slipped = np.clip(slipped + travel * _FINER, -ends, ends)
             stress += float(stiffness @ slipped)
         if s.simo or s.roxburgh:
-            largest = second_laws.healed(s, largest, path.stretch[n], h * _FINER)
-            out.append(second_laws.wholeness(s, largest, path.stretch[n], rest) - 1.0)
+            largest = generator_b_laws.healed(s, largest, path.stretch[n], h * _FINER)
+            out.append(generator_b_laws.wholeness(s, largest, path.stretch[n], rest) - 1.0)
         else:
             out.append(stress + float(np.dot(moduli, strain - late)) / path.stretch[n])
     return np.array(out)
@@ -116,11 +118,11 @@ def main() -> None:
             targets = (response(name, numbers(name, **shape)) for shape in shapes_of(name))
             left = [left_by(laws, target) for target in targets]
             print(f"| {family} | {name} | {min(left):.2g} to {max(left):.2g} |")
-    print("\n| family | form of the second hand | left, % |\n|---|---|---|")
+    print("\n| family | form of generator B | left, % |\n|---|---|---|")
     for family, laws in sorted(general.items()):
         for form in SECOND_FORMS[family]:
             drawn = (form(np.random.default_rng(seed), THESIS_LOAD) for seed in range(seeds))
-            found = [of_second_hand(effect) for effect in drawn]
+            found = [of_generator_b(effect) for effect in drawn]
             left = [left_by(laws, target) for target in found if target is not None]
             print(f"| {family} | {form.__name__} | {min(left):.2g} to {max(left):.2g} |")
 

@@ -4,7 +4,7 @@
     python -m tests.blind --cases 10 --clean 0 --train thesis
     python -m tests.blind --cases 0 --clean 0 --per-family 4
     python -m tests.blind --seeds 17,41      these alone
-    python -m tests.blind --hand second      laws that neither the library nor the first hand has
+    python -m tests.blind --hand second      laws that neither the library nor generator A has
     python -m tests.blind --cases 0 --clean 20 --noise coarse
     python -m tests.blind --table            the table of what is there
 

@@ -70,11 +70,14 @@ def links(path: str) -> Iterator[str]:
             yield str(target)
 
 
+def inline_code(path: str) -> Iterator[str]:
+    """All code within lines."""
+    return (child.content for child in _inline(path) if child.type == "code_inline")
+
+
 def inline_commands(path: str) -> Iterator[str]:
     """Code within lines that begins with ``dearig`` and a space."""
-    for child in _inline(path):
-        if child.type == "code_inline" and re.match(r"dearig [a-z-]", child.content):
-            yield child.content
+    return (text for text in inline_code(path) if re.match(r"dearig [a-z-]", text))
 
 
 def _inline(path: str) -> Iterator[Token]:

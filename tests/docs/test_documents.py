@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -27,7 +28,15 @@ from dearig.config.targetfile import parse_target
 from dearig.docs import pages
 from dearig.docs.site import anchors
 from tests.docs import reference
-from tests.docs.markdown import ROOT, Block, blocks, documents, inline_commands, links
+from tests.docs.markdown import (
+    ROOT,
+    Block,
+    blocks,
+    documents,
+    inline_code,
+    inline_commands,
+    links,
+)
 from tests.tools.command import done, write
 
 #: Pages whose commands are run in the order shown, in one folder for each page.
@@ -35,6 +44,11 @@ RUN = [p for p in documents() if p.startswith("app/docs/") or "/" not in p]
 #: Options of ``dearig`` itself.
 GENERAL = {"--help", "-h", "--version", "--install-completion", "--show-completion"}
 COMMANDS: dict[str, Any] = get_command(app).commands  # type: ignore[attr-defined]
+
+
+def is_history(path: str) -> bool:
+    """Whether a document tells of former states: its names need not exist any more."""
+    return path == "CHANGELOG.md" or "/results/2" in path
 
 
 def of_language(*names: str) -> list[Block]:
@@ -83,6 +97,52 @@ def test_every_command_within_a_line_exists(path: str) -> None:
             known.update(parameter.opts, parameter.secondary_opts)
         options = [w.split("=")[0] for w in words if re.match(r"--?[a-z]", w)]
         assert [o for o in options if o not in known] == [], text
+
+
+#: Files that an example tells the reader to write, or that stand for files of the reader.
+EXAMPLES = {
+    *("acme.py", "app.py", "conftest.py", "drivers.py", "fading_drag.py", "model.py"),
+    *("numbers.py", "queue.py", "sawtooth.py", "spaced.py", "test_acme.py", "test_sawtooth.py"),
+}
+
+
+@pytest.mark.parametrize("path", [p for p in documents() if not is_history(p)])
+def test_every_file_and_folder_named_in_a_line_exists(path: str) -> None:
+    missing = [
+        text
+        for text in inline_code(path)
+        if re.fullmatch(r"[\w./-]+\.py" if "README" not in path else r"[\w./-]+(\.py|/)", text)
+        and text.split("/")[-1] not in EXAMPLES
+        and not text.startswith(("/", ".", "../shared"))
+        and not is_named(text.rstrip("/"), (ROOT / path).parent)
+    ]
+    assert missing == []
+
+
+@pytest.mark.parametrize("path", [p for p in documents() if p.endswith("README.md")])
+def test_every_module_in_a_table_of_modules_exists(path: str) -> None:
+    text = (ROOT / path).read_text(encoding="utf-8")
+    for table in re.findall(r"^\| module \|.*\n\|[-|]+\n((?:\|.*\n)+)", text, re.MULTILINE):
+        names = re.findall(r"`([\w./]+)`", "".join(r.split("|")[1] for r in table.splitlines()))
+        folder = (ROOT / path).parent
+        missing = [n for n in names if not is_named(n.removesuffix("/"), folder)]
+        missing = [n for n in missing if not is_named(f"{n}.py", folder)]
+        assert names
+        assert missing == []
+
+
+@cache
+def repository() -> frozenset[str]:
+    """All sources and folders of sources, as paths that begin with a slash."""
+    roots = [ROOT / name for name in ("app", "drivers", "model", "sim_backend", "tests", ".ci")]
+    files = {file for root in roots for file in root.rglob("*.py")}
+    folders = {folder for file in files for folder in file.parents if folder.is_relative_to(ROOT)}
+    return frozenset(f"/{p.relative_to(ROOT).as_posix()}" for p in files | folders)
+
+
+def is_named(name: str, folder: Path) -> bool:
+    """Whether a file of this name is in the folder, or the end of a path in the repository."""
+    return (folder / name).exists() or any(p.endswith(f"/{name}") for p in repository())
 
 
 def accept(words: list[str]) -> None:

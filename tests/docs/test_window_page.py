@@ -24,5 +24,5 @@ def test_labels_in_italics_are_labels_of_the_window(page: str) -> None:
 
 #: What is in italics for another reason: works, and words that are stressed.
 TITLES = {
-    "Free-Energy\nBased Modeling of Planar Dielectric Elastomer Actuators",
+    "Free-Energy Based Modeling of Planar Dielectric Elastomer Actuators",
 }

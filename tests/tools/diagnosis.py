@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, SeparatingExperiment, Stand
+from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, Evaluation, SeparatingExperiment
 from dearig.config.modelfile import ModelFile
 from dearig.model.diagnosis.results import (
     Candidate,
@@ -121,8 +121,10 @@ def after_of(comparison: Comparison, seed: int, rms: float | None = None) -> Com
     return replace(comparison, model=model, errors=errors(comparison.measured, model))
 
 
-def _stands(train: tuple[Comparison, ...], others: tuple[Comparison, ...]) -> tuple[Stand, Stand]:
-    return Stand((), train, others), Stand(
+def _stands(
+    train: tuple[Comparison, ...], others: tuple[Comparison, ...]
+) -> tuple[Evaluation, Evaluation]:
+    return Evaluation((), train, others), Evaluation(
         ("sensor lag",),
         tuple(after_of(c, i) for i, c in enumerate(train)),
         tuple(after_of(c, i + 10) for i, c in enumerate(others)),
@@ -185,7 +187,7 @@ def nothing_missing() -> DiagnoseOutcome:
     """A diagnosis that found nothing, without untouched recordings."""
     outcome = diagnose_outcome()
     clean = after_of(outcome.before.train[0], 3)
-    stand = Stand((), (clean,), ())
+    stand = Evaluation((), (clean,), ())
     fitted = stage(BASE, 1e-6, estimates=ESTIMATES)
     return replace(
         outcome,

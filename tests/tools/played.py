@@ -56,7 +56,7 @@ class Bench:
     at: float = 1_800_000_000.0
 
     def record(self, *given, **_) -> RunResult:
-        """Stand in for the run: count it, and leave the recording that its fate asks for."""
+        """Evaluation in for the run: count it, and leave the recording that its fate asks for."""
         *_, out, options = given
         name = out.stem
         self.played[name] += 1

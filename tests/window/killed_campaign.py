@@ -35,6 +35,7 @@ from dearig.sim_backend.clock import PacedClock
 from dearig.sim_backend.daqmx.card.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
 from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
+from dearig.window.campaign.page import CampaignPage
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import TextFile
@@ -79,7 +80,7 @@ def play(folder: Path, port: int, picture: str) -> None:
     settings = QSettings(str(folder / "settings.ini"), QSettings.Format.IniFormat)
     session = Session(folder, settings, theme=LIGHT)
     window = shown(session)
-    hand, page = Hand(), window.campaign_page
+    hand, page = Hand(), window.page(CampaignPage)
     controls = page.controls
     until(window.isActiveWindow, "the window becomes active")
     session.set_rig_file(folder / "rig.toml", RIG, load_rig_file(folder / "rig.toml"))

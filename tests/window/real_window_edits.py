@@ -14,6 +14,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QWidget
 
 from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from tests.window.real_window import Hand, shown, until
 
@@ -36,7 +37,7 @@ def main() -> None:
     settings = QSettings(str(folder / "settings.ini"), QSettings.Format.IniFormat)
     session = Session(folder, settings, theme=LIGHT)
     window = shown(session)
-    hand, rig, sequence, run = Hand(), window.rig_page, window.sequence_page, window.run_page
+    hand, rig, sequence, run = Hand(), window.page(RigPage), window.sequence_page, window.run_page
     saw: dict[str, object] = {}
 
     def click(widget: QWidget) -> None:

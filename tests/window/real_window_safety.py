@@ -20,6 +20,7 @@ from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from dearig.window.study.page import StudyPage
 from tests.window.conftest import SHORT
 from tests.window.real_window import Hand, end, until
 
@@ -131,7 +132,7 @@ def on_a_simulated_rig(story: Story) -> None:
 
     ends = []
     story.start()
-    window.show_page(window.study_page)
+    window.show_page(window.page(StudyPage))
     story.click(bar.stop_button)
     ends.append(story.ended())
     story.start()

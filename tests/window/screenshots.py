@@ -24,10 +24,15 @@ from dearig.acquisition.run import RunOptions, record
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
+from dearig.window.campaign.page import CampaignPage
+from dearig.window.follow.page import FollowPage
 from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.recordings.page import RecordingsPage
+from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import TextFile
 from dearig.window.shell.frame import MainWindow
+from dearig.window.study.page import StudyPage
 from tests.window.real_window import end
 
 SIZES = ((1366, 768), (1920, 1080))
@@ -111,9 +116,9 @@ def make_recordings(folder: Path) -> None:
 def views(window: MainWindow) -> Iterator[str]:
     """Bring one view after another to the screen; its name is what the picture is called."""
     session, run = window.session, window.run_page
-    recordings, study = window.recordings_page, window.study_page
+    recordings, study = window.page(RecordingsPage), window.page(StudyPage)
     folder = session.folder
-    window.show_page(window.rig_page)
+    window.show_page(window.page(RigPage))
     yield "rig"
     window.show_page(window.sequence_page)
     yield "sequence"
@@ -174,7 +179,7 @@ def views(window: MainWindow) -> Iterator[str]:
 
 def following(window: MainWindow) -> Iterator[str]:
     """The page Follow: a target that cannot be reached, and one that is learned."""
-    session, run, follow = window.session, window.run_page, window.follow_page
+    session, run, follow = window.session, window.run_page, window.page(FollowPage)
     session.set_address(SOFT)
     run.paced.setChecked(False)
     window.show_page(follow)
@@ -201,7 +206,7 @@ def following(window: MainWindow) -> Iterator[str]:
 
 def holding(window: MainWindow) -> Iterator[str]:
     """The hold on the page Follow: before it, refused, checked, while it runs, and measured."""
-    run, follow = window.run_page, window.follow_page
+    run, follow = window.run_page, window.page(FollowPage)
     panel = follow.hold
     window.session.set_address("sim")
     window.show_page(follow)
@@ -234,7 +239,7 @@ def holding(window: MainWindow) -> Iterator[str]:
 
 def campaigning(window: MainWindow) -> Iterator[str]:
     """The page Campaign: a plan, one that is refused, a campaign that goes on, and its end."""
-    page, runner = window.campaign_page, window.run_page.runner
+    page, runner = window.page(CampaignPage), window.run_page.runner
     window.session.set_address("sim")
     window.show_page(page)
     example = page.plan.toml

@@ -16,8 +16,10 @@ from dearig.config.rigfile import RigFile
 from dearig.report.study_view import view_of
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.kit.widgets import label
+from dearig.window.recordings.page import RecordingsPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from dearig.window.study.page import StudyPage
 from tests.report.test_study_file import made as study_on_paper
 from tests.tools.diagnosis import diagnose_outcome
 from tests.window.made_recordings import made
@@ -74,7 +76,7 @@ def test_every_page_shows_whole_words_without_keys_and_markup(
         window.show_page(page)
         look(f"{page.title} at the start")
 
-    recordings = window.recordings_page
+    recordings = window.page(RecordingsPage)
     window.show_page(recordings)
     names = [folder / "<b>bold.h5", folder / "<b>bold2.h5"]
     until(lambda: len(recordings._library.summaries) == 2)
@@ -86,7 +88,7 @@ def test_every_page_shows_whole_words_without_keys_and_markup(
     until(lambda: len(recordings.plot.shown) == 2)
     look("Recordings, two")
 
-    study = window.study_page
+    study = window.page(StudyPage)
     window.show_page(study)
     study.recordings.check(names[:1], names[1:])
     study.show_view(view_of(study_on_paper(folder / "study-1", diagnose_outcome(title=HOSTILE))))

@@ -13,7 +13,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.model.film.material import THESIS_FILM, VACUUM_PERMITTIVITY, Film
-from dearig.model.readings.records import bridged
+from dearig.model.readings.records import interpolated
 from dearig.model.readings.spikes import RINGING, spikes
 from dearig.recording.reading.recording import Recording
 
@@ -104,7 +104,7 @@ def spikes_about(
     """
     if recording.noise is None or recording.noise.step:
         return np.zeros_like(usable), ()
-    left = bridged(recording.time, residual, usable)
+    left = interpolated(recording.time, residual, usable)
     found = spikes(recording.time, left, pull, recording.quiet_samples) & usable
     if not found.any():
         return found, ()

@@ -19,11 +19,11 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError
 from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
-from dearig.model.readings.denoise import quieted, reading_noise
-from dearig.model.readings.environment import CELSIUS, HUMIDITY, air_sentences
+from dearig.model.readings.denoise import reading_noise, smoothed
+from dearig.model.readings.environment import CELSIUS, HUMIDITY, air_texts
 from dearig.model.readings.measures import errors
 from dearig.model.readings.noise import LEAD_IN, require_readings, rest_of_rounded, slow_at_rest
-from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, bridged, counted
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, counted, interpolated
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import Lobes
 from dearig.model.simulation.strip import Strip
@@ -38,15 +38,15 @@ from dearig.recording.reading.recording import Recording
 __all__ = [
     "PUBLISHED_FIT",
     "Source",
-    "air_sentences_of",
+    "air_texts_of",
     "as_record",
     "check_named_once",
     "compare",
-    "noise_sentences",
+    "noise_texts",
     "open_all",
     "reading_noise_of",
     "recording_drive",
-    "room_sentences",
+    "room_texts",
 ]
 
 #: A recording that was opened, or the path of one.
@@ -134,13 +134,13 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
             reading_noise_of(recording, None)  # refuses one that never changes
             valid = inspect(recording, drive).valid
             noise = reading_noise_of(recording, valid)
-            stress = bridged(recording.time, stress, valid)
+            stress = interpolated(recording.time, stress, valid)
             return FilmRecord(recording.name, recording.time, stretch, stress, noise.value, valid)
         displacement = _from_rest(recording)
         reading_noise_of(recording, None)
         driven = recording_drive(recording, drive)
         valid = inspect(recording, drive).valid
-        displacement = bridged(recording.time, displacement, valid)
+        displacement = interpolated(recording.time, displacement, valid)
         noise = reading_noise_of(recording, valid)
         if noise.step:
             valid = ~recording.quiet if valid is None else valid & ~recording.quiet
@@ -174,7 +174,7 @@ def reading_noise_of(recording: Recording, valid: np.ndarray | None) -> ReadingN
     return noise
 
 
-def noise_sentences(recordings: Iterable[Recording]) -> list[str]:
+def noise_texts(recordings: Iterable[Recording]) -> list[str]:
     """Return a sentence on each recording of an actuator whose noise is not simply that at rest.
 
     It is from no lead-in, or something moves there.
@@ -236,7 +236,7 @@ def recording_drive(recording: Recording, drive: str) -> Drive:
         volts = _present(voltage)
         noise = reading_noise(volts)
         if noise > 0.0:
-            volts = quieted(volts, noise)
+            volts = smoothed(volts, noise)
         return Drive(recording.time, volts, recording.hold, warmth, moisture, temperature, humidity)
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error
@@ -259,7 +259,7 @@ def _air(
     return scale * changes, scale * first - reference
 
 
-def room_sentences(recordings: Sequence[Recording]) -> list[str]:
+def room_texts(recordings: Sequence[Recording]) -> list[str]:
     """Return a sentence with the means of temperature and humidity; none where not recorded."""
     parts = []
     for name, unit in (("temperature_degC", "°C"), ("relative_humidity_percent", "%")):
@@ -270,11 +270,11 @@ def room_sentences(recordings: Sequence[Recording]) -> list[str]:
     return [f"the room was at {', '.join(parts)} (means of the recordings)"] if parts else []
 
 
-def air_sentences_of(recordings: Sequence[Recording]) -> list[str]:
+def air_texts_of(recordings: Sequence[Recording]) -> list[str]:
     """Return why what films owe to the recorded air of the room cannot be looked for."""
     driven = [r for r in recordings if r.kind == "actuator"]
     return list(
-        air_sentences(
+        air_texts(
             [_air(r, "temperature_degC", 1.0, CELSIUS)[1] for r in driven],
             [_air(r, "relative_humidity_percent", 0.01, HUMIDITY)[1] for r in driven],
         )

@@ -15,7 +15,7 @@ from dearig.errors import InputError
 from dearig.progress import Progress, part, quiet
 from dearig.recording.importers.columns.choose import choose
 from dearig.recording.importers.columns.chosen import Chosen, label_in, own_name
-from dearig.recording.importers.columns.specimen import Specimen, specimen_told
+from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
 from dearig.recording.importers.formats.columns import Overview
 from dearig.recording.importers.importing import OPENED
 from dearig.recording.importers.quantities.units import Scale
@@ -128,7 +128,7 @@ def content_of(
     block: Sequence[Sequence[str]] = getattr(source, "block", ())
     return Content(
         path, columns, proposals, _taken(source, scales),
-        is_text=hasattr(source, "layout"), told=specimen_told(block),
+        is_text=hasattr(source, "layout"), told=specimen_from_header(block),
         block=tuple(printable(" ".join(row)) for row in block if row),
     )  # fmt: skip
 

@@ -394,7 +394,7 @@ def lines(entries: Sequence[Entry]) -> list[str]:
             shown.append(f"{'not read':<25}  {'':>10}  {entry.path}: {entry.trouble}")
             continue
         length = "" if entry.duration_s is None else f"{entry.duration_s:.6g} s"
-        facts = [entry.title, *_peaks_in_words(entry), entry.rig, entry.film_id, entry.operator]
+        facts = [entry.title, *_peaks_text(entry), entry.rig, entry.film_id, entry.operator]
         if not entry.complete:
             facts.append(f"INCOMPLETE: {entry.outcome}")
         told = ", ".join(fact for fact in facts if fact)
@@ -402,7 +402,7 @@ def lines(entries: Sequence[Entry]) -> list[str]:
     return shown
 
 
-def _peaks_in_words(entry: Entry) -> list[str]:
+def _peaks_text(entry: Entry) -> list[str]:
     shown = (("voltage_command", 1e-3, "kV"), ("displacement", 1e3, "mm"))
     return [
         f"{entry.peaks[name] * factor:.3g} {unit}"

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from dearig.analysis.outcomes import Comparison
 
-__all__ = ["bin_words", "residual_figure", "residual_panels"]
+__all__ = ["bin_text", "residual_figure", "residual_panels"]
 
 
 def residual_figure(comparison: Comparison) -> Figure:
@@ -97,7 +97,7 @@ def _edges(residual: np.ndarray, noise: float, step: float) -> np.ndarray:
     return (np.arange(first, last + 2) * steps - steps // 2 - 0.5) * step
 
 
-def bin_words(comparison: Comparison) -> str:
+def bin_text(comparison: Comparison) -> str:
     """Return how wide the bins of the histogram are, in converter steps where these are known."""
     if comparison.step <= 0.0:
         return ""

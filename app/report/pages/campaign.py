@@ -39,7 +39,7 @@ __all__ = [
     "campaign_summary",
     "campaign_table",
     "forecast_json",
-    "forecast_sentences",
+    "forecast_texts",
     "write_campaign_report",
 ]
 
@@ -112,7 +112,7 @@ def forecast_json(campaign: Campaign, forecast: Forecast) -> dict[str, Any]:
     }
 
 
-def forecast_sentences(campaign: Campaign, forecast: Forecast) -> Iterator[str]:
+def forecast_texts(campaign: Campaign, forecast: Forecast) -> Iterator[str]:
     """Yield sentences on runs, time, disk and margins of a campaign that was not begun."""
     warm = sum(run.warm_up for run in campaign.runs)
     extra = f", of which {warm} to warm up" if warm else ""

@@ -12,7 +12,7 @@ import numpy as np
 
 from dearig.report.figures import diagnosis as drawn
 from dearig.report.figures.recordings import comparison_figure
-from dearig.report.figures.residual import bin_words, residual_panels
+from dearig.report.figures.residual import bin_text, residual_panels
 from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.html import Picture, picture, prefixes, write_page
 from dearig.report.text.diagnosis import (
@@ -331,7 +331,7 @@ def _after_pictures(
     if not chosen:
         return ()
     captions = (
-        f"histogram of the error{bin_words(chosen[0])}, and the distribution of noise alone.",
+        f"histogram of the error{bin_text(chosen[0])}, and the distribution of noise alone.",
         "autocorrelation of the error; that of noise lies in the grey band.",
         "amplitude density of the error; that of white noise is flat.",
     )

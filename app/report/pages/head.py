@@ -24,7 +24,7 @@ __all__ = [
     "command_line",
     "head_of",
     "origins_of",
-    "simulated_words",
+    "simulated_text",
 ]
 
 #: What is said of a value that no recording has.
@@ -78,7 +78,7 @@ def head_of(origins: Iterable[Origin], rows: Sequence[tuple[str, Sequence[str]]]
         "Rig file (SHA-256)": _distinct(origins, lambda o: o.rig_file),
     }
     lines = tuple(RecordingLine(o.name, _about(o), o.sha256 or "not computed") for o in origins)
-    return Head(simulated_words(origins), tuple((found | given).items()), lines)
+    return Head(simulated_text(origins), tuple((found | given).items()), lines)
 
 
 def command_line() -> str:
@@ -96,7 +96,7 @@ def origins_of(comparisons: Iterable[Comparison]) -> tuple[Origin, ...]:
     return tuple(Origin(c.name) if c.origin is None else c.origin for c in comparisons)
 
 
-def simulated_words(origins: Sequence[Origin]) -> str:
+def simulated_text(origins: Sequence[Origin]) -> str:
     """Return which recordings are simulated, with rigs and seeds; "" where none is."""
     made = [o for o in origins if o.simulated]
     if not made:

@@ -19,7 +19,7 @@ from dearig.report.figures.parameters import (
     parameters_figure,
 )
 from dearig.report.figures.recordings import comparison_figure, loop_figure
-from dearig.report.figures.residual import bin_words, residual_panels
+from dearig.report.figures.residual import bin_text, residual_panels
 from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.pdf import check_browser, is_pdf, write_pdf
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
@@ -395,7 +395,7 @@ def _comparison_pictures(
 
 def _residual_pictures(comparison: Comparison, prefixes: Iterator[str]) -> tuple[Picture, ...]:
     captions = (
-        f"Histogram of the error{bin_words(comparison)}, and the distribution of noise alone.",
+        f"Histogram of the error{bin_text(comparison)}, and the distribution of noise alone.",
         "Autocorrelation of the error; that of noise lies in the grey band.",
         "Amplitude density of the error; that of white noise is flat.",
     )

@@ -16,9 +16,9 @@ from dearig.report.text.trends import (
     effect_table,
     number_name,
     own_table,
-    proposal_sentences,
+    proposal_texts,
     trend_title,
-    trends_sentences,
+    trends_texts,
 )
 
 __all__ = ["write_trends_report"]
@@ -60,9 +60,9 @@ def _contents(trends: Trends, title: str) -> Callable[[], dict[str, Any]]:
             "title": title,
             "lead": "Trends",
             "head": head_of(_origins(trends), [("Film", [_films(trends)])]),
-            "summary": tuple(trends_sentences(trends)),
+            "summary": tuple(trends_texts(trends)),
             "tables": tables,
-            "next": proposal_sentences(trends),
+            "next": proposal_texts(trends),
             "drawn": drawn,
             "not_drawn": ", ".join(number_name(t.name) for t in trends.trends[_DRAWN:]),
         }

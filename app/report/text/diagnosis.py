@@ -11,7 +11,7 @@ import numpy as np
 from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
 from dearig.model.verdict import TOLERANCE
 from dearig.report.text.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
-from dearig.report.text.sentences import few_data_sentence, listed
+from dearig.report.text.sentences import few_data_text, listed
 from dearig.report.text.tables import BOUND_MARK, Row, Table
 from dearig.units import SHOWN, parameter_unit, readable
 
@@ -152,9 +152,9 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
             "predicts other recordings."
         )
     if outcome.few_data:
-        said.append(few_data_sentence(outcome.few_data))
+        said.append(few_data_text(outcome.few_data))
     said += _events(outcome)
-    said += [_rivals_sentence(step) for step in finding.steps if step.indistinguishable_from]
+    said += [_rivals_text(step) for step in finding.steps if step.indistinguishable_from]
     if finding.unnamed is not None:
         said.append(_unnamed(outcome))
     said += outcome.performed
@@ -318,7 +318,7 @@ def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
         yield f"In {c.name} there is {what}: other recordings are predicted without it.{left}"
 
 
-def _rivals_sentence(step: Step) -> str:
+def _rivals_text(step: Step) -> str:
     return (
         f"These data cannot separate {step.effect} from "
         f"{listed(family_label(f) for f in step.indistinguishable_from)}: each explains them "

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "describe_model",
-    "few_data_sentence",
+    "few_data_text",
     "identify_summary",
     "listed",
-    "undetermined_sentence",
+    "undetermined_text",
     "validate_summary",
     "warnings_of",
 ]
@@ -96,7 +96,7 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
         )
         if any(c.is_simulated for c in train):
             said.append(SIMULATED_CAVEAT)
-    said += _spring_sentence(outcome.springs)
+    said += _spring_texts(outcome.springs)
     chosen = [t for t in outcome.trials if t.chosen]
     if chosen:
         tried = listed(str(t.branches) for t in outcome.trials)
@@ -105,12 +105,12 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
             f"criterion of the training data."
         )
     if outcome.few_data:
-        said.append(few_data_sentence(outcome.few_data))
-    said.append(undetermined_sentence(outcome.fit))
+        said.append(few_data_text(outcome.few_data))
+    said.append(undetermined_text(outcome.fit))
     return tuple(said)
 
 
-def _spring_sentence(candidates: Sequence[SpringCandidate]) -> list[str]:
+def _spring_texts(candidates: Sequence[SpringCandidate]) -> list[str]:
     """Return a sentence on the strain energy that was chosen; none where there was no choice."""
     if not candidates:
         return []
@@ -130,7 +130,7 @@ def _spring_sentence(candidates: Sequence[SpringCandidate]) -> list[str]:
     ]
 
 
-def few_data_sentence(few: str) -> str:
+def few_data_text(few: str) -> str:
     """Return a sentence on ``few`` data."""
     return (
         f"Very little was fitted: {few}. Slow effects, and differences between loadings, do not "
@@ -162,7 +162,7 @@ def validate_summary(outcome: ValidateOutcome) -> tuple[str, ...]:
     return tuple(said)
 
 
-def undetermined_sentence(fit: Identification) -> str:
+def undetermined_text(fit: Identification) -> str:
     """Return a sentence on the parameters that the data do not determine."""
     if fit.covariance.size == 0:
         return (

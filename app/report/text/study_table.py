@@ -9,7 +9,7 @@ from dearig.batch.studies import StudyTable
 from dearig.report.text.numbers import NO_VALUE, interval, quoted, significant
 from dearig.report.text.tables import Row, Table
 
-__all__ = ["study_table_json", "study_table_rows", "study_table_sentences"]
+__all__ = ["study_table_json", "study_table_rows", "study_table_texts"]
 
 #: Columns that a terminal shows, where the rows have them.
 _COLUMNS = (
@@ -40,7 +40,7 @@ def study_table_json(table: StudyTable) -> dict[str, Any]:
     }
 
 
-def study_table_sentences(table: StudyTable) -> Iterator[str]:
+def study_table_texts(table: StudyTable) -> Iterator[str]:
     """Yield what was computed, and what could not be."""
     count = len(table.rows)
     failed = f", {len(table.failed)} without a result" if table.failed else ""

@@ -16,10 +16,10 @@ __all__ = [
     "effect_table",
     "number_name",
     "own_table",
-    "proposal_sentences",
+    "proposal_texts",
     "trend_title",
     "trends_json",
-    "trends_sentences",
+    "trends_texts",
 ]
 
 _PROPOSALS = 6  # that are shown; all are in the JSON
@@ -93,7 +93,7 @@ def _trend_json(trend: Trend) -> dict[str, Any]:
     }
 
 
-def trends_sentences(trends: Trends) -> Iterator[str]:
+def trends_texts(trends: Trends) -> Iterator[str]:
     """Yield what the trends say together, the common effects first."""
     films = len(set(trends.films))
     count = len(trends.rows)
@@ -105,12 +105,12 @@ def trends_sentences(trends: Trends) -> Iterator[str]:
     for verdict in ("common", "untold", "differs", "one_film"):
         for trend, effect in every:
             if effect.verdict == verdict:
-                yield _effect_sentence(trend, effect)
+                yield _effect_text(trend, effect)
     if not any(effect.verdict in ("common", "untold") for _, effect in every):
         yield "No effect is seen in all films."
     for trend in trends.trends:
         for change in trend.changes:
-            yield _change_sentence(trend, change)
+            yield _change_text(trend, change)
 
 
 def _models(trends: Trends) -> Iterator[str]:
@@ -143,7 +143,7 @@ def _at_once(trends: Trends) -> Iterator[str]:
         )
 
 
-def _effect_sentence(trend: Trend, effect: Effect) -> str:
+def _effect_text(trend: Trend, effect: Effect) -> str:
     per = _per(effect)
     low, high = sorted((effect.low, effect.high))
     size = f"{_signed(effect.slope, effect)} {_unit(trend)} {per} (95 %: {interval_of(low, high)})"
@@ -163,7 +163,7 @@ def _effect_sentence(trend: Trend, effect: Effect) -> str:
     return f"{name}: films differ{told}; their mean is {size}."
 
 
-def _change_sentence(trend: Trend, change: Change) -> str:
+def _change_text(trend: Trend, change: Change) -> str:
     when = f" ({change.started[:16].replace('T', ' ')})" if change.started else ""
     return (
         f"Film {change.film or 'without a name'}: {number_name(trend.name, unit=False)} jumps by "
@@ -277,7 +277,7 @@ def change_table(trends: Trends) -> Table | None:
     return Table("Change points", head, tuple(rows)) if rows else None
 
 
-def proposal_sentences(trends: Trends) -> tuple[str, ...]:
+def proposal_texts(trends: Trends) -> tuple[str, ...]:
     """Return what the next experiment should vary, the most useful first."""
     found = tuple(
         p.sentence.replace(p.number, number_name(p.number, unit=False)) if p.number else p.sentence

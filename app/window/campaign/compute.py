@@ -22,14 +22,14 @@ from dearig.progress import Progress, quiet
 from dearig.window.jobs.program_errors import ErrorInProcess
 from dearig.window.jobs.worker_process import Request, Response, serve
 
-__all__ = ["ComputeApart"]
+__all__ = ["ComputeProcess"]
 
 log = logging.getLogger(__name__)
 
 _POLL = 0.2  # s between two looks at STOP
 
 
-class ComputeApart:
+class ComputeProcess:
     """Stands in for ``compute``, and does it in a process that starts with the first call."""
 
     def __init__(self, interrupts: Interrupts) -> None:

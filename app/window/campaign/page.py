@@ -8,9 +8,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from PySide6.QtCore import Qt, QTimer, Signal, Slot
+from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
@@ -35,7 +35,7 @@ from dearig.window.campaign.plan import (
     with_requests,
 )
 from dearig.window.campaign.table import CampaignTable, QueueRows, rows_of_plan
-from dearig.window.campaign.texts import counted, killed_words, obstacle, plan_words, runs_text
+from dearig.window.campaign.texts import arming_block, counted, crash_text, plan_text, runs_text
 from dearig.window.campaign.thread import CampaignRequest, CampaignThread
 from dearig.window.documents import dialogs
 from dearig.window.high_voltage.state import HighVoltage
@@ -46,8 +46,10 @@ from dearig.window.jobs.worker import Worker
 from dearig.window.kit.browser import open_in_browser
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label
+from dearig.window.run.page import RunPage
 from dearig.window.run.runner import Play, RunEnd, Runner
 from dearig.window.session.layout_state import remember
+from dearig.window.session.page import Page, Pages
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import TextFile
 
@@ -63,18 +65,15 @@ _NEXT = "the next run starts by itself"
 _PAUSED = "the campaign is paused"
 
 
-class CampaignPage(QWidget):
-    """Plans, arms and plays campaigns with ``runner``, and continues them.
-
-    ``show_recording`` carries a recording to look at.
-    """
+class CampaignPage(Page):
+    """Plans, arms and plays campaigns with ``runner``, and continues them."""
 
     title = "Campaign"
-    shortcut = "Ctrl+7"
-    show_recording = Signal(Path)
+    at_start = True
+    edits = "plan"
 
     def __init__(self, session: Session, runner: Runner, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self._session = session
         self._runner = runner
         self.faults: FaultPlan | None = None  #: faults of the next simulated campaign
@@ -109,6 +108,15 @@ class CampaignPage(QWidget):
         self._connect()
         self._refresh()
 
+    @classmethod
+    def make(cls, session: Session, pages: Pages) -> Self:
+        """Return the page; it plays with the runner of the page Run."""
+        return cls(session, pages.page(RunPage).runner)
+
+    def restore(self, text: str, file: TextFile) -> None:
+        """Replace the plan by the unsaved one of an earlier window."""
+        self.plan.restore(text, file)
+
     # what the page offers
 
     @property
@@ -124,7 +132,7 @@ class CampaignPage(QWidget):
     @property
     def ready(self) -> bool:
         """True where the runs that wait are surveyed and can be armed, apart from the rig."""
-        return not self._obstacle()
+        return not self._arming_block()
 
     def open_campaign(self, folder: Path) -> None:
         """Show the campaign in ``folder``, to continue it."""
@@ -134,7 +142,12 @@ class CampaignPage(QWidget):
     def start(self) -> None:
         """Play the armed batch; the second of the two steps."""
         session, found = self._session, self._survey
-        if found is None or found.campaign is None or found.forecast is None or self._obstacle():
+        if (
+            found is None
+            or found.campaign is None
+            or found.forecast is None
+            or self._arming_block()
+        ):
             return
         resume = self._folder is not None
         try:
@@ -168,12 +181,12 @@ class CampaignPage(QWidget):
         self._numbers.start()
         self._refresh()
 
-    def wish(self, *wishes: tuple[str, str]) -> None:
-        """Ask for ``wishes`` as ``dearig campaign-queue`` does: kinds, and names of runs or ""."""
+    def wish(self, *requests: tuple[str, str]) -> None:
+        """Ask for ``requests`` as ``dearig campaign-queue`` does: kinds, names of runs or ""."""
         if self._folder is None:
             return
         try:
-            ask(self._folder, wishes, self._session.operator)
+            ask(self._folder, requests, self._session.operator)
         except InputError as error:
             self._fail(str(error))
             return
@@ -260,7 +273,7 @@ class CampaignPage(QWidget):
             return
         self.table.show_rows(rows_of_plan(campaign, forecast))
         self.headline.setText(f"{campaign.name}: {runs_text(len(campaign.runs))}")
-        self.summary.show_text(plan_words(found), "muted")
+        self.summary.show_text(plan_text(found), "muted")
 
     # queue
 
@@ -268,9 +281,7 @@ class CampaignPage(QWidget):
     def _opened(self, found: OpenedCampaign) -> None:
         self._folder, self._queue, self._rows = found.folder, found.queue, QueueRows()
         self._soon = found.queue
-        self.message.show_text(
-            killed_words(found.queue) if found.status == "killed" else "", "warn"
-        )
+        self.message.show_text(crash_text(found.queue) if found.status == "killed" else "", "warn")
         self.controls.forget_proposal()
         self._sizes = {}
         self.plan.restore(
@@ -389,7 +400,7 @@ class CampaignPage(QWidget):
 
     @Slot(bool)
     def _arm(self, armed: bool) -> None:
-        if not (armed and self._obstacle()):
+        if not (armed and self._arming_block()):
             self._runner.arm(armed, Play.CAMPAIGN)
         self._refresh()
 
@@ -440,7 +451,7 @@ class CampaignPage(QWidget):
         folder = dialogs.choose_folder(
             self, self._session, "Continue a campaign", self._session.folder
         )
-        if folder is not None and (self._folder is not None or self.plan.may_drop()):
+        if folder is not None and (self._folder is not None or self.plan.confirm_discard()):
             self.open_campaign(folder)
 
     @Slot()
@@ -480,18 +491,18 @@ class CampaignPage(QWidget):
 
     # state
 
-    def _obstacle(self) -> str:
+    def _arming_block(self) -> str:
         """Return why the batch cannot be armed, "" where it can, apart from the rig's blocks."""
         begun, said = self._folder is not None, self.controls.seen.text()
-        return obstacle(self._session, self._survey, self._soon, begun, said)
+        return arming_block(self._session, self._survey, self._soon, begun, said)
 
     @Slot()
     def _refresh(self) -> None:
         session, runner, controls = self._session, self._runner, self.controls
         running = runner.playing is Play.CAMPAIGN
-        obstacle = "" if session.running else self._obstacle()
+        arming_block = "" if session.running else self._arming_block()
         armed = runner.armed_for(Play.CAMPAIGN)
-        ready = not (session.running or obstacle or session.blocks)
+        ready = not (session.running or arming_block or session.blocks)
         if armed and not ready:
             runner.arm(False, Play.CAMPAIGN)
             return  # the change of the state comes here again
@@ -506,7 +517,7 @@ class CampaignPage(QWidget):
             blocks.append("a run goes on: see the page Run")
         elif armed != runner.armed:
             blocks.append("a run is armed: see the page Run")
-        words = [obstacle] if obstacle and self._survey is not None else []
+        words = [arming_block] if arming_block and self._survey is not None else []
         controls.blocked.show_text(
             "\n".join(f"{w[:1].upper()}{w[1:]}." for w in [*words, *blocks]), "warn"
         )

@@ -9,7 +9,7 @@ from dearig.report.pages.campaign import duration_text
 from dearig.window.campaign.plan import PlanSurvey
 from dearig.window.session.state import Session
 
-__all__ = ["counted", "killed_words", "obstacle", "plan_words", "runs_text"]
+__all__ = ["arming_block", "counted", "crash_text", "plan_text", "runs_text"]
 
 _USED = 0.1  # of a limit: what uses less of it is not named
 
@@ -19,7 +19,7 @@ def runs_text(count: int) -> str:
     return f"{count:,} run{'' if count == 1 else 's'}"
 
 
-def plan_words(found: PlanSurvey) -> str:
+def plan_text(found: PlanSurvey) -> str:
     """Return time, disk and margins of a plan that was surveyed."""
     campaign, forecast = found.campaign, found.forecast
     if campaign is None:
@@ -59,7 +59,7 @@ def counted(queue: Queue) -> str:
     return f"{queue.name}: {runs_text(len(queue.runs))}" + (f", {parts}" if parts else "")
 
 
-def killed_words(queue: Queue) -> str:
+def crash_text(queue: Queue) -> str:
     """Return what happened to a campaign whose program was killed, and what its start does."""
     run = queue.running
     if run is None:
@@ -81,7 +81,7 @@ def killed_words(queue: Queue) -> str:
     )
 
 
-def obstacle(
+def arming_block(
     session: Session, found: PlanSurvey | None, queue: Queue, begun: bool, seen: str
 ) -> str:
     """Return why a batch cannot be armed, "" where it can, apart from what blocks the rig.

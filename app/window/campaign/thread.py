@@ -19,7 +19,7 @@ from dearig.config.rigfile import RigFile
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import DearigError
 from dearig.output_state import Known, OutputState
-from dearig.window.campaign.compute import ComputeApart
+from dearig.window.campaign.compute import ComputeProcess
 from dearig.window.run.live import Live
 from dearig.window.run.runner import PROGRAM_FAULT, Play, PlayThread, RunEnd, headline_of
 
@@ -72,11 +72,11 @@ class CampaignThread(PlayThread):
     def run(self) -> None:
         request = self._request
         outcome: list[CampaignOutcome] = []
-        computing = ComputeApart(self.interrupts)
+        computing = ComputeProcess(self.interrupts)
         try:
             play_campaign(
                 request.campaign, request.address, request.rig_file, request.folder,
-                request.options, request.arming, resume=request.resume, observer=_Observed(self),
+                request.options, request.arming, resume=request.resume, observer=LiveObserver(self),
                 ended=outcome.append, noted=self._note, interrupts=self.interrupts,
                 computing=computing, progress=self._progress,
             )  # fmt: skip
@@ -140,7 +140,7 @@ def _left(outcome: CampaignOutcome) -> str:
     return f"{left} run{'s wait' if left > 1 else ' waits'}; arm and start again to go on"
 
 
-class _Observed(RunObserver):
+class LiveObserver(RunObserver):
     """Hands what comes from each run to a ``Live`` of its own."""
 
     def __init__(self, thread: CampaignThread) -> None:

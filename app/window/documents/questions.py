@@ -10,12 +10,12 @@ from PySide6.QtWidgets import QWidget
 from dearig.window.documents.dialogs import ask
 from dearig.window.kit.widgets import Message
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import Asked, TextFile
+from dearig.window.session.text_file import OverwriteQuestion, TextFile
 
-__all__ = ["may_close", "may_drop", "offer_unsaved", "replace_or_tell"]
+__all__ = ["confirm_discard", "may_close", "offer_unsaved", "replace_or_tell"]
 
 
-def may_drop(parent: QWidget, session: Session, file: TextFile, text: str) -> bool:
+def confirm_discard(parent: QWidget, session: Session, file: TextFile, text: str) -> bool:
     """Return True if ``text`` has no unsaved changes, or the operator gives them up."""
     return not file.is_unsaved(text) or ask(
         parent,
@@ -41,7 +41,11 @@ def may_close(parent: QWidget, session: Session) -> bool:
 
 
 def replace_or_tell(
-    parent: QWidget, session: Session, asked: Asked, save: Callable[..., None], trouble: Message
+    parent: QWidget,
+    session: Session,
+    asked: OverwriteQuestion,
+    save: Callable[..., None],
+    trouble: Message,
 ) -> None:
     """Ask whether a file that another program has changed may be replaced.
 

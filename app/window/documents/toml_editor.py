@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QVBoxLayout, QWidget
 
 from dearig.config.toml_input import read_text
 from dearig.window.documents.dialogs import choose_file, save_as
-from dearig.window.documents.questions import may_drop, replace_or_tell
+from dearig.window.documents.questions import confirm_discard, replace_or_tell
 from dearig.window.jobs.background import Background
 from dearig.window.kit.widgets import Message, button, label
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import Asked, Saved, TextFile
+from dearig.window.session.text_file import OverwriteQuestion, Saved, TextFile
 
 __all__ = ["EditorWords", "TomlEditor"]
 
@@ -93,7 +93,7 @@ class TomlEditor(QWidget):
 
     def open_file(self, path: Path) -> None:
         """Read the file ``path``."""
-        if may_drop(self, self.session, self._file, self.toml):
+        if confirm_discard(self, self.session, self._file, self.toml):
             self.files.start(lambda: (path, read_text(path, self.words.what)))
 
     def save_file(self, path: Path, replace: bool = False) -> None:
@@ -107,18 +107,18 @@ class TomlEditor(QWidget):
         self.edit.setPlainText(toml)
         self._edited()
 
-    def may_drop(self) -> bool:
+    def confirm_discard(self) -> bool:
         """Return True if the text is saved, or the operator gives its changes up."""
-        return may_drop(self, self.session, self._file, self.toml)
+        return confirm_discard(self, self.session, self._file, self.toml)
 
     def close_work(self) -> None:
         """Wait for the thread that reads and writes files."""
         self.files.close()
 
     @Slot(object)
-    def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
+    def _file_done(self, answer: tuple[Path, str] | Saved | OverwriteQuestion) -> None:
         self.trouble.show_text("")
-        if isinstance(answer, Asked):
+        if isinstance(answer, OverwriteQuestion):
             replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
         elif isinstance(answer, Saved):
             answer.file.note(answer)
@@ -140,7 +140,7 @@ class TomlEditor(QWidget):
 
     @Slot()
     def _example(self) -> None:
-        if self.may_drop():
+        if self.confirm_discard():
             self.restore(self._text_of_example, TextFile(self.words.what, self._text_of_example))
 
     @Slot()

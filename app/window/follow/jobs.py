@@ -18,7 +18,14 @@ from dearig.progress import Progress, quiet
 from dearig.recording.reading.reader import open_recording
 from dearig.report.pages.track import write_track_report
 
-__all__ = ["FollowRequest", "Followed", "Played", "begin_following", "learn_from", "write_report"]
+__all__ = [
+    "FollowRequest",
+    "PlayedRun",
+    "TrackingState",
+    "begin_following",
+    "learn_from",
+    "write_report",
+]
 
 
 @dataclass(frozen=True)
@@ -38,7 +45,7 @@ class FollowRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
+class TrackingState:
     """How far the runs of a request have come.
 
     ``margins`` are those of the proposed run, or ``reasons`` say why the gate refuses it.
@@ -51,14 +58,16 @@ class Followed:
 
 
 @dataclass(frozen=True)
-class Played:
+class PlayedRun:
     """The ``recording`` of a run; ``sequence`` is the TOML of the proposed one."""
 
     recording: Path
     sequence: str
 
 
-def begin_following(request: FollowRequest, film: str = "", progress: Progress = quiet) -> Followed:
+def begin_following(
+    request: FollowRequest, film: str = "", progress: Progress = quiet
+) -> TrackingState:
     """Compute the voltage of the first run, and check it with the gate for the ``film`` by name.
 
     Raises ``InputError``.
@@ -72,12 +81,12 @@ def begin_following(request: FollowRequest, film: str = "", progress: Progress =
     else:
         model = load_model(request.model)
     tracking = Tracking(target, model, request.rig_file, iterations=None, within=request.within)
-    return _checked(Followed(request, tracking), film, progress)
+    return _checked(TrackingState(request, tracking), film, progress)
 
 
 def learn_from(
-    followed: Followed, played: Played, film: str = "", progress: Progress = quiet
-) -> Followed | None:
+    followed: TrackingState, played: PlayedRun, film: str = "", progress: Progress = quiet
+) -> TrackingState | None:
     """Learn from a run, and return what is proposed next; None if it played something else.
 
     Raises ``InputError`` for a run from which nothing can be learned.
@@ -90,13 +99,13 @@ def learn_from(
     return _checked(followed, film, progress)
 
 
-def write_report(followed: Followed, path: Path, progress: Progress = quiet) -> Path:
+def write_report(followed: TrackingState, path: Path, progress: Progress = quiet) -> Path:
     """Write the report of all runs to ``path``."""
     progress("writing the report", 0.0)
     return write_track_report(followed.tracking.outcome(followed.request.address), path)
 
 
-def _checked(followed: Followed, film: str, progress: Progress) -> Followed:
+def _checked(followed: TrackingState, film: str, progress: Progress) -> TrackingState:
     """Return ``followed`` with what the gate says of the proposed run."""
     request, proposed = followed.request, followed.tracking.proposed
     if proposed is None:

@@ -41,6 +41,7 @@ class ModelChoice(QComboBox):
         self.setMinimumContentsLength(16)
         self.activated.connect(self._activated)
         session.folder_changed.connect(self.find_studies)
+        session.study_finished.connect(self.find_studies)
         self._fill()
         self.find_studies()
 

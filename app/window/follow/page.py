@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtWidgets import (
@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from dearig.analysis.track_target import WITHIN
 from dearig.analysis.tracking import TrackedRun
+from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.recording.result_folder import numbered_folder
 from dearig.report.pages.track import (
@@ -34,9 +35,9 @@ from dearig.report.text.tables import Table
 from dearig.units import readable
 from dearig.window.follow.hold_panel import HoldPanel
 from dearig.window.follow.jobs import (
-    Followed,
     FollowRequest,
-    Played,
+    PlayedRun,
+    TrackingState,
     begin_following,
     learn_from,
     write_report,
@@ -51,8 +52,11 @@ from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.report_table import ReportTable
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label
+from dearig.window.run.page import RunPage
 from dearig.window.session.layout_state import remember
+from dearig.window.session.page import Page, Pages
 from dearig.window.session.state import Session
+from dearig.window.session.text_file import TextFile
 
 __all__ = ["FollowPage"]
 
@@ -61,27 +65,24 @@ _COLUMNS = [520, 340]  # px, of the words and of the error from run to run
 _WITHIN_MAX = 1000.0  # um
 
 
-class FollowPage(QWidget):
+class FollowPage(Page):
     """Proposes the runs of a target one after another, and learns from their recordings.
 
-    ``play_sequence`` carries a sequence file for the page Run; ``use_model`` the model file to
-    overlay there; ``waits`` is True while the run of a shown sequence is awaited.
+    ``waits`` is True while the run of a shown sequence is awaited.
     """
 
     title = "Follow"
-    shortcut = "Ctrl+6"
-    play_sequence = Signal(Path)
-    use_model = Signal(Path)
+    edits = "target"
     waits = Signal(bool)
 
     def __init__(
         self, session: Session, parent: QWidget | None = None, worker: Worker | None = None
     ) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self._session = session
         self._worker = worker or Worker(self)
         self._job: Job | None = None
-        self._followed: Followed | None = None
+        self._followed: TrackingState | None = None
         self._folder: Path | None = None  # of the sequences that were shown
         self._awaited = ""  # TOML of the sequence that was shown on the page Run
         self._recorded_meanwhile: Path | None = None  # while a job went on
@@ -91,6 +92,7 @@ class FollowPage(QWidget):
         )
         self.hold = HoldPanel(session, self._worker)
         self.hold.use_model.connect(self.use_model)
+        self.hold.play_hold.connect(self.play_hold)
         self.hold.waits.connect(self.waits)
         self.modes = QTabWidget()
         self.modes.setDocumentMode(True)
@@ -112,10 +114,23 @@ class FollowPage(QWidget):
         session.recorded.connect(self._recorded)
         self._refresh()
 
+    @classmethod
+    def make(cls, session: Session, pages: Pages) -> Self:
+        """Return the page; it observes the runs of the page Run."""
+        page, run = cls(session), pages.page(RunPage)
+        run.started.connect(page.hold.watch)
+        run.runner.ended.connect(page.hold.run_ended)
+        page.waits.connect(run.follow_button.setVisible)
+        return page
+
+    def restore(self, text: str, file: TextFile) -> None:
+        """Replace the target by the unsaved one of an earlier window."""
+        self.target.restore(text, file)
+
     # what the page offers
 
     @property
-    def followed(self) -> Followed | None:
+    def followed(self) -> TrackingState | None:
         """The target that is followed, and its runs."""
         return self._followed
 
@@ -204,13 +219,13 @@ class FollowPage(QWidget):
         self._refresh()
 
     @Slot(object)
-    def _begun(self, followed: Followed) -> None:
+    def _begun(self, followed: TrackingState) -> None:
         self._folder = None
         self._await("")
         self._show(followed)
 
     @Slot(object)
-    def _learned(self, followed: Followed | None) -> None:
+    def _learned(self, followed: TrackingState | None) -> None:
         if followed is None:  # another sequence was played
             return
         self._await("")
@@ -248,7 +263,7 @@ class FollowPage(QWidget):
             )
             return
         job = self._worker.submit(
-            learn_from, self._followed, Played(path, self._awaited), self._session.film
+            learn_from, self._followed, PlayedRun(path, self._awaited), self._session.film
         )
         self._submit(job, self._learned)
 
@@ -260,7 +275,12 @@ class FollowPage(QWidget):
         model = None if self._followed is None else self._followed.request.model
         if model is not None:
             self.use_model.emit(model)
-        self.play_sequence.emit(path)
+        try:
+            toml = read_text(path, "sequence")
+        except InputError as error:
+            self.message.show_text(str(error))
+            return
+        self.play_sequence.emit(toml, path)
 
     def _best(self) -> TrackedRun | None:
         if self._followed is None:
@@ -273,14 +293,14 @@ class FollowPage(QWidget):
 
     # display
 
-    def _show(self, followed: Followed) -> None:
+    def _show(self, followed: TrackingState) -> None:
         self._followed = followed
         tracking = followed.tracking
         outcome = tracking.outcome(followed.request.address)
         self.headline.setText(track_headline(outcome))
         notes = () if not tracking.runs else tracking.runs[-1].notes
         self.next_run.show_pieces(
-            self._next_words(followed),
+            self._next_texts(followed),
             tuple(readable(f"{said}.") for said in (*tracking.warnings, *notes)),
         )
         self.runs.show_table(runs_table(outcome))
@@ -292,7 +312,7 @@ class FollowPage(QWidget):
         self._draw()
         self._refresh()
 
-    def _next_words(self, followed: Followed) -> list[str | Table]:
+    def _next_texts(self, followed: TrackingState) -> list[str | Table]:
         proposed, missed = followed.tracking.proposed, followed.tracking.inversion.unreachable
         pieces: list[str | Table] = []
         if proposed is not None:
@@ -343,7 +363,7 @@ class FollowPage(QWidget):
             self._job is None and followed is not None and bool(followed.tracking.runs)
         )
 
-    def _state(self, followed: Followed, changed: bool) -> tuple[str, str]:
+    def _state(self, followed: TrackingState, changed: bool) -> tuple[str, str]:
         """Return what keeps the next run from being shown on the page Run, and its role."""
         if changed:
             return "Target, model or rig have changed: compute the voltage again.", "warn"

@@ -116,6 +116,7 @@ class HighVoltageStatus(QObject):
         self._lock: QLockFile | None = None  # while a run goes on
         self.alarm: LatchedAlarm | None = None
         session.rig_changed.connect(self._rig_changed)
+        session.output_read.connect(self.set_read_at_rest)
         self._restore()
 
     @property

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dearig.analysis.import_preview import Trial, look_into, try_import, write_import
+from dearig.analysis.import_preview import ImportTrial, preview_file, try_import, write_import
 from dearig.config.imports import raw_scales
 from dearig.errors import InputError
 from dearig.recording.content.metadata import RunMetadata
@@ -186,7 +186,7 @@ class ImportDialog(QDialog):
         """Read the file again, with the line of names that is given."""
         self.content = None
         self._line = self.fields.names_line.value()
-        self._submit(self._show_content, look_into, self.path, self._line or None, self._raw())
+        self._submit(self._show_content, preview_file, self.path, self._line or None, self._raw())
         self._show_state()
 
     def _raw(self) -> dict[str, Any]:
@@ -357,11 +357,13 @@ class ImportDialog(QDialog):
             try_import, self.path, options, metadata,
         )  # fmt: skip
 
-    def _take_trial(self, trial: Trial, options: ImportOptions, metadata: RunMetadata) -> None:
+    def _take_trial(
+        self, trial: ImportTrial, options: ImportOptions, metadata: RunMetadata
+    ) -> None:
         self._tried = options, metadata
         self._show_trial(trial)
 
-    def _show_trial(self, trial: Trial | None, trouble: str = "") -> None:
+    def _show_trial(self, trial: ImportTrial | None, trouble: str = "") -> None:
         self.plot.show_trial(trial)
         if trial is None:
             self.said.show_text(in_window_words(trouble, self.path))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Slot
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from dearig.analysis.import_preview import Trial
+from dearig.analysis.import_preview import ImportTrial
 from dearig.units import SHOWN
 from dearig.window.plots.area import PlotArea
 from dearig.window.session.state import Session
@@ -14,12 +14,12 @@ __all__ = ["ImportPlot"]
 
 
 class ImportPlot(QWidget):
-    """Drive and measured quantity of a ``Trial`` over time."""
+    """Drive and measured quantity of a ``ImportTrial`` over time."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self.shown: Trial | None = None
+        self.shown: ImportTrial | None = None
         self.area = PlotArea(session, "Data of the import")
         self.drive = self.area.add_plot(0, left="Voltage (kV)", weight=3)
         self.measured = self.area.add_plot(1, left="Displacement (mm)", weight=5)
@@ -28,7 +28,7 @@ class ImportPlot(QWidget):
         outer.addWidget(self.area)
         session.theme_changed.connect(self._draw)
 
-    def show_trial(self, trial: Trial | None) -> None:
+    def show_trial(self, trial: ImportTrial | None) -> None:
         """Draw ``trial``, or nothing."""
         self.shown = trial
         self._draw()

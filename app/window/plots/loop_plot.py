@@ -13,7 +13,7 @@ from dearig.window.kit.widgets import label
 from dearig.window.plots.area import PlotArea
 from dearig.window.session.state import Session
 
-__all__ = ["LoopPlot", "area_words"]
+__all__ = ["LoopPlot", "area_text"]
 
 _SQUARED = "\N{SUPERSCRIPT TWO}"
 _TIP = (
@@ -22,7 +22,7 @@ _TIP = (
 )
 
 
-def area_words(loops: Loops, squared: bool) -> str:
+def area_text(loops: Loops, squared: bool) -> str:
     """Return the mean hysteresis area of a cycle with its unit, and its range over the cycles."""
     if not loops.cycles:
         return "no complete cycle"
@@ -90,7 +90,7 @@ class LoopPlot(QWidget):
             alone = len(self._shown) == 1
             colour = theme.measured if alone else theme.curves[i % len(theme.curves)]
             volts = loops.voltage * 1e-3
-            self.plot.add_curve(f"{loops.name}: {area_words(loops, squared)}", colour).set_points(
+            self.plot.add_curve(f"{loops.name}: {area_text(loops, squared)}", colour).set_points(
                 volts**2 if squared else volts, loops.displacement * 1e3
             )
         self.area.file_stem = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, Signal, Slot
+from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent, QKeySequence
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -46,6 +46,7 @@ from dearig.window.recordings.table import RecordingsTable
 from dearig.window.recordings.tags_field import TagsField
 from dearig.window.recordings.trend_plot import TrendPlot
 from dearig.window.session.layout_state import remember
+from dearig.window.session.page import Page
 from dearig.window.session.state import Session
 
 __all__ = ["RecordingsPage"]
@@ -55,18 +56,13 @@ _CHOOSE_MS = 80  # wait after a selection: arrow keys pass over many rows
 _OPEN_MODEL = "Open a model file …"
 
 
-class RecordingsPage(QWidget):
-    """Browser of the session's folder.
-
-    ``open_sequence`` carries the sequence of a recording, to be edited or run again.
-    """
+class RecordingsPage(Page):
+    """Browser of the session's folder; a recording's sequence can be edited or run again."""
 
     title = "Recordings"
-    shortcut = "Ctrl+4"
-    open_sequence = Signal(str)
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self._session = session
         self._library = shared_library(session)
         self.imports = Imports(session, self)
@@ -445,7 +441,7 @@ class RecordingsPage(QWidget):
     @Slot()
     def _open_its_sequence(self) -> None:
         if len(self.plot.shown) == 1:
-            self.open_sequence.emit(self.plot.shown[0].sequence_toml)
+            self.edit_sequence.emit(self.plot.shown[0].sequence_toml)
 
     # import
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
+from PySide6.QtCore import QSignalBlocker, Qt, Slot
 from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeySequence, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -35,14 +35,15 @@ from dearig.drivers.errors import AddressError
 from dearig.errors import InputError
 from dearig.units import readable
 from dearig.window.documents.dialogs import choose_file, save_as
-from dearig.window.documents.questions import may_drop, replace_or_tell
+from dearig.window.documents.questions import confirm_discard, replace_or_tell
 from dearig.window.jobs.background import Background
 from dearig.window.kit.fields import form_fields, in_words
 from dearig.window.kit.form import Form
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
+from dearig.window.session.page import Page
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import Asked, Saved, TextFile
+from dearig.window.session.text_file import OverwriteQuestion, Saved, TextFile
 
 __all__ = ["RigPage"]
 
@@ -52,15 +53,15 @@ _BLOCK, _ADDRESS_BLOCK = "rig file", "rig address"  # keys of what blocks arming
 _KINDS = ("sim", "hidden", "local", "remote")
 
 
-class RigPage(QWidget):
+class RigPage(Page):
     """Chooses and checks the rig, and edits the rig file with faults beside their fields."""
 
     title = "Rig"
-    shortcut = "Ctrl+1"
-    output_read = Signal(object)  #: state of the output that a check has read
+    at_start = True
+    edits = "rig file"
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self.session = session
         self.text = session.rig_text
         self._in_force = session.rig_text  # the last text without faults
@@ -147,7 +148,7 @@ class RigPage(QWidget):
         self.outcome = outcome if is_present else None
         self._show_outcome()
         if is_present and outcome.output is not None:
-            self.output_read.emit(outcome.output)
+            session.output_read.emit(outcome.output)
 
     @Slot(bool)
     def _checking(self, busy: bool) -> None:
@@ -177,7 +178,7 @@ class RigPage(QWidget):
 
     def open_file(self, path: Path) -> None:
         """Read a rig file."""
-        if may_drop(self, self.session, self.file, self.text):
+        if confirm_discard(self, self.session, self.file, self.text):
             self._files.start(lambda: (path, read_text(path, "rig file")))
 
     @Slot()
@@ -211,9 +212,9 @@ class RigPage(QWidget):
         self._files.close()
 
     @Slot(object)
-    def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
+    def _file_done(self, answer: tuple[Path, str] | Saved | OverwriteQuestion) -> None:
         self.trouble.show_text("")
-        if isinstance(answer, Asked):
+        if isinstance(answer, OverwriteQuestion):
             replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
         elif isinstance(answer, Saved):
             answer.file.note(answer)
@@ -513,6 +514,6 @@ class RigPage(QWidget):
 
     @Slot()
     def _ask_defaults(self) -> None:
-        if may_drop(self, self.session, self.file, self.text):
+        if confirm_discard(self, self.session, self.file, self.text):
             self._take("", TextFile("rig file", ""))
             self._show_all()

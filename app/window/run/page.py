@@ -17,7 +17,7 @@ from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rigs import is_simulated
 from dearig.analysis.hold import HoldPlan
-from dearig.drivers.daqmx.watchdog import watchdog_words
+from dearig.drivers.daqmx.watchdog import watchdog_text
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.high_voltage.status import Reading
@@ -29,6 +29,7 @@ from dearig.window.run.hold_texts import answer_text, hold_text
 from dearig.window.run.live import Live
 from dearig.window.run.overlay_chooser import OverlayChooser
 from dearig.window.run.runner import Play, RunEnd, Runner, RunRequest
+from dearig.window.session.page import Page
 from dearig.window.session.state import Session
 
 __all__ = ["RunPage"]
@@ -36,19 +37,15 @@ __all__ = ["RunPage"]
 _NUMBERS = 100  # ms between two updates of the readouts: faster ones cannot be read
 
 
-class RunPage(QWidget):
+class RunPage(Page):
     """Starts and stops runs, and shows them: ``runner`` plays, ``live`` has the curves."""
 
     title = "Run"
-    shortcut = "Ctrl+3"
-
-    show_recording = Signal(Path)
-    show_sequence = Signal()
-    show_follow = Signal()
+    at_start = True
     started = Signal(object)  #: what looks on at a run that has begun
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self.session = session
         self.runner = Runner(session, self)
         self.faults: FaultPlan | None = None  #: faults of the next simulated run
@@ -192,7 +189,7 @@ class RunPage(QWidget):
             self.watchdog.show_text("")
             return
         card = session.rig_file.card
-        words = watchdog_words(card, simulated=None)
+        words = watchdog_text(card, simulated=None)
         if not (card.watchdog_s or card.i_have_no_watchdog):
             words += "; a run on a real card needs card.i_have_no_watchdog = true in the rig file"
         self.watchdog.show_text(f"Hardware watchdog: {words}", "" if card.watchdog_s else "warn")
@@ -385,7 +382,7 @@ class RunPage(QWidget):
         self.watchdog = Message()
         column.addWidget(self.watchdog)
         self.to_sequence = button("Edit the &sequence", "Go to the Sequence page")
-        self.to_sequence.clicked.connect(self.show_sequence)
+        self.to_sequence.clicked.connect(lambda: self.go_to.emit("Sequence"))
         row.addWidget(self.plan, 1)
         row.addWidget(self.to_sequence)
         column.addLayout(row)
@@ -397,7 +394,7 @@ class RunPage(QWidget):
         self.follow_button = button(
             "&Back to Follow", "What is learned from the run is shown there"
         )
-        self.follow_button.clicked.connect(self.show_follow)
+        self.follow_button.clicked.connect(lambda: self.go_to.emit("Follow"))
         self.follow_button.hide()
         row.addWidget(self.result, 1)
         row.addWidget(self.show_button)

@@ -273,7 +273,7 @@ def _alarm(end: RunEnd, address: str) -> LatchedAlarm:
     )
 
 
-class _Observed(RunObserver):
+class LiveObserver(RunObserver):
     """Hands everything on to ``live``, and what is known of the output to ``tell`` too."""
 
     def __init__(self, live: Live, tell: Callable[[OutputState], None]) -> None:
@@ -321,7 +321,7 @@ class _RunThread(PlayThread):
                 None,
             )
             return
-        observer = _Observed(self._live, self.output_known.emit)
+        observer = LiveObserver(self._live, self.output_known.emit)
         try:
             options = RunOptions(
                 order.configuration, order.operator, order.film, order.notes,

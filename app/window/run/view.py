@@ -22,7 +22,7 @@ from dearig.window.run.plots import PLOTS, RunPlots
 from dearig.window.session.settings import kept_text
 from dearig.window.session.state import Preview, Session
 
-__all__ = ["RunView", "planned_words"]
+__all__ = ["RunView", "planned_text"]
 
 _SPANS = {"last 2 s": 2.0, "last 5 s": 5.0, "last 10 s": 10.0, "last 30 s": 30.0,
           "last 60 s": 60.0, "whole run": None}  # fmt: skip
@@ -30,7 +30,7 @@ _KEY = "run/plots"  # of the settings: names of the plots that are hidden
 _NO_LAST = "There was no run since the window was opened"
 
 
-def planned_words(preview: Preview | None) -> str:
+def planned_text(preview: Preview | None) -> str:
     """Return what the plots show before a run: name, peak voltage and duration of the plan."""
     if preview is None:
         return "Planned: the plan is being made …"
@@ -105,7 +105,7 @@ class RunView(QWidget):
     def show_planned(self, preview: Preview | None) -> None:
         """Show the plan."""
         self.planned.setChecked(True)
-        self._set_words(planned_words(preview), "heading")
+        self._set_words(planned_text(preview), "heading")
         if preview is not None and preview.plan is not None:
             tip = f"{preview.plan.samples:,} samples at {preview.plan.rate:g} Hz"
             self.words.setToolTip(f"{tip} on {self._session.address}")

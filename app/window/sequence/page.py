@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtCore import Qt, Slot
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QMenu, QSplitter, QVBoxLayout, QWidget
 
@@ -12,7 +12,7 @@ from dearig.config.presets import PRESETS
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.window.documents.dialogs import choose_file, save_as
-from dearig.window.documents.questions import may_drop, replace_or_tell
+from dearig.window.documents.questions import confirm_discard, replace_or_tell
 from dearig.window.jobs.background import Background
 from dearig.window.kit.fields import in_words
 from dearig.window.kit.theme import SPACE
@@ -21,8 +21,9 @@ from dearig.window.sequence.draft import Draft, relative_csv
 from dearig.window.sequence.editor import SequenceEditor
 from dearig.window.sequence.preview_panel import PreviewPanel
 from dearig.window.session.layout_state import remember
+from dearig.window.session.page import Page
 from dearig.window.session.state import Preview, Session
-from dearig.window.session.text_file import Asked, Saved, TextFile
+from dearig.window.session.text_file import OverwriteQuestion, Saved, TextFile
 
 __all__ = ["SequencePage"]
 
@@ -30,16 +31,15 @@ _ENDINGS = (".toml", ".csv")
 _BLOCK = "sequence"  # key of what blocks arming
 
 
-class SequencePage(QWidget):
+class SequencePage(Page):
     """Shows and changes the sequence of the session: ``editor`` at the left, ``preview`` right."""
 
     title = "Sequence"
-    shortcut = "Ctrl+2"
-
-    show_run = Signal()
+    at_start = True
+    edits = "sequence"
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self.session = session
         toml, folder = session.sequence_toml, session.sequence_folder
         # what an earlier session had without a file is in no file yet
@@ -91,18 +91,22 @@ class SequencePage(QWidget):
         """
         file, text = self.draft.file, self.draft.toml
 
-        def write() -> Saved | Asked:
+        def write() -> Saved | OverwriteQuestion:
             return file.write(path, text, replace)
 
         self._files.start(write)
 
     def may_replace(self) -> bool:
         """Return True if the sequence has no unsaved changes, or the operator gives them up."""
-        return may_drop(self, self.session, self.draft.file, self.draft.toml)
+        return confirm_discard(self, self.session, self.draft.file, self.draft.toml)
 
-    def take(self, toml: str) -> bool:
-        """Replace the sequence by ``toml`` of another page; False where the operator refuses."""
-        return self.may_replace() and self._take(toml, TextFile("sequence", toml))
+    def take(self, toml: str, path: Path | None = None) -> bool:
+        """Replace the sequence by ``toml`` of another page; False where the operator refuses.
+
+        ``path`` is the file that holds it, None where no file does.
+        """
+        folder = Path() if path is None else path.parent
+        return self.may_replace() and self._take(toml, TextFile("sequence", toml, path, folder))
 
     def restore(self, toml: str, file: TextFile) -> None:
         """Replace the sequence by the unsaved one of an earlier window."""
@@ -137,8 +141,8 @@ class SequencePage(QWidget):
         self._files.close()
 
     @Slot(object)
-    def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
-        if isinstance(answer, Asked):
+    def _file_done(self, answer: tuple[Path, str] | Saved | OverwriteQuestion) -> None:
+        if isinstance(answer, OverwriteQuestion):
             replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
             return
         if isinstance(answer, Saved):
@@ -306,7 +310,7 @@ class SequencePage(QWidget):
         self.file_name = label("", "muted")
         row.addWidget(self.file_name)
         run = button("Go to R&un", "Go to the Run page, to arm and start it", primary=True)
-        run.clicked.connect(self.show_run)
+        run.clicked.connect(lambda: self.go_to.emit("Run"))
         row.addWidget(run)
         return row
 

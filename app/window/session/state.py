@@ -95,8 +95,10 @@ class Session(QObject):
     recent_changed = Signal()
     recorded = Signal(Path)
     running_changed = Signal(bool)
+    study_finished = Signal(object)  #: a ``Study`` has just been saved in the folder
     hold_changed = Signal()  #: another feedback belongs to the sequence
     blocks_changed = Signal()
+    output_read = Signal(object)  #: state of the output that a check of the rig has read
     message = Signal(str)  #: text for the status bar
 
     def __init__(

@@ -13,7 +13,7 @@ from dearig.recording.files import write_whole
 from dearig.window.kit.fields import in_words
 from dearig.window.kit.widgets import plain_tip
 
-__all__ = ["Asked", "Saved", "TextFile"]
+__all__ = ["OverwriteQuestion", "Saved", "TextFile"]
 
 _PARTS_MAX = 4  # changed parts that a question names
 
@@ -57,11 +57,11 @@ class TextFile:
         listed = ", ".join(parts[:_PARTS_MAX]) + (f" and {more} more" if more > 0 else "")
         return f"{name} (changed: {in_words(listed)})"
 
-    def write(self, path: Path, text: str, replace: bool) -> Saved | Asked:
+    def write(self, path: Path, text: str, replace: bool) -> Saved | OverwriteQuestion:
         """Write ``text`` to ``path`` as a whole; raises ``InputError`` where that is not possible.
 
-        Nothing is written, and ``Asked`` is returned, where that is the file of this text and
-        another program has changed it, unless ``replace``. May be called from any thread.
+        Nothing is written, and ``OverwriteQuestion`` is returned, where that is the file of this
+        text and another program has changed it, unless ``replace``. May be called from any thread.
         """
         if path == self.path and not replace and path.exists():
             try:
@@ -69,7 +69,7 @@ class TextFile:
             except InputError:
                 same = False
             if not same:
-                return Asked(
+                return OverwriteQuestion(
                     path, f"{path} was changed by another program since it was opened here"
                 )
         write_whole(path, text.encode("utf-8"))
@@ -90,7 +90,7 @@ class Saved:
 
 
 @dataclass(frozen=True)
-class Asked:
+class OverwriteQuestion:
     """A file that was not written: another program has changed it, as the ``sentence`` says."""
 
     path: Path

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast
+from typing import TypeVar, cast
 
 from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Slot
 from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QKeySequence, QShowEvent
@@ -24,13 +23,9 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.analysis.hold import HoldPlan
-from dearig.config.toml_input import read_text
-from dearig.errors import InputError
 from dearig.window import NO_SCREEN
-from dearig.window.campaign.page import CampaignPage
 from dearig.window.documents.dialogs import run_dialog
 from dearig.window.documents.questions import may_close, offer_unsaved
-from dearig.window.follow.page import FollowPage
 from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.stop_keys import StopKeys
 from dearig.window.kit.theme import DARK, LIGHT, SPACE, apply, system_theme
@@ -38,43 +33,25 @@ from dearig.window.kit.wheel_guard import WheelGuard
 from dearig.window.kit.widgets import label, plain_tip
 from dearig.window.recordings.library import shared_library
 from dearig.window.recordings.page import RecordingsPage
-from dearig.window.rig.page import RigPage
 from dearig.window.run.page import RunPage
 from dearig.window.run.runner import Play
 from dearig.window.sequence.page import SequencePage
 from dearig.window.sequence.planner import Planner
 from dearig.window.session.layout_state import GROUP
+from dearig.window.session.page import Page
 from dearig.window.session.settings import kept_bytes, kept_number, kept_text
 from dearig.window.session.state import Session
+from dearig.window.session.text_file import TextFile
 from dearig.window.shell.banners import Banners
 from dearig.window.shell.compilation import Compilation, CompilationBar
 from dearig.window.shell.error_panel import ErrorPanel
 from dearig.window.shell.guide import Guide
-from dearig.window.study.page import StudyPage
+from dearig.window.shell.pages import PAGES
 
 __all__ = ["MainWindow"]
 
 _COLOUR_SCHEMES = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
-
-
-class Page(Protocol):
-    """Attributes of every page."""
-
-    title: str
-    shortcut: str
-
-
-#: Attributes of ``MainWindow`` that are pages, and their classes, in the order of the list.
-_PAGES: dict[str, type[Page]] = {
-    "rig_page": RigPage,
-    "sequence_page": SequencePage,
-    "run_page": RunPage,
-    "recordings_page": RecordingsPage,
-    "study_page": StudyPage,
-    "follow_page": FollowPage,
-    "campaign_page": CampaignPage,
-}
-_AnyPage = TypeVar("_AnyPage", bound=QWidget)
+P = TypeVar("P", bound=Page)
 
 
 class MainWindow(QMainWindow):
@@ -88,15 +65,18 @@ class MainWindow(QMainWindow):
         self.planner = Planner(session, self)
         self.compilation = Compilation(self)
         self.library = shared_library(session)  # lists the folder while the window is made
-        self.rig_page = RigPage(session)
-        self.sequence_page = SequencePage(session)
-        self.run_page = RunPage(session)
-        self.campaign_page = CampaignPage(session, self.run_page.runner)
+        self._pages: dict[type[Page], Page] = {}
+        self._make_list()
+        self.run_page = self.page(RunPage)
+        self.sequence_page = self.page(SequencePage)
+        for kind in PAGES:
+            if kind.at_start:
+                self.page(kind)
         self.stop_keys = StopKeys(self._stop_by_key, lambda: session.busy, self)
+        self._build()
         self._guide: Guide | None = None
         self._closing = False
         self._by_signal = False  # closed by a signal: nobody is there to be asked
-        self._build()
         self._connect()
         self._apply_colour_scheme()
         self._restore_state()
@@ -106,57 +86,31 @@ class MainWindow(QMainWindow):
     # pages
 
     @property
-    def pages(self) -> tuple[QWidget, ...]:
+    def pages(self) -> tuple[Page, ...]:
         """All pages in the order of the list; those that nobody has needed yet are made."""
-        return tuple(self._page(row) for row in range(len(_PAGES)))
+        return tuple(map(self.page, PAGES))
 
-    @cached_property
-    def recordings_page(self) -> RecordingsPage:
-        """The page Recordings, made when it is first needed, as are Study and Follow.
+    def page(self, kind: type[P]) -> P:
+        """Return the page of the class ``kind``; makes it where it has not been needed yet."""
+        if kind not in self._pages:
+            self._put(kind.make(self.session, self))
+        return cast(P, self._pages[kind])
 
-        These three take half the time of a start.
-        """
-        page = RecordingsPage(self.session)
-        page.open_sequence.connect(self._read_sequence)
-        return self._put("recordings_page", page)
-
-    @cached_property
-    def study_page(self) -> StudyPage:
-        """The page Study; see ``recordings_page``."""
-        page = StudyPage(self.session)
-        page.open_sequence.connect(self._play_sequence)
-        page.show_model.connect(self._show_model)
-        page.study_finished.connect(self._study_finished)
-        return self._put("study_page", page)
-
-    @cached_property
-    def follow_page(self) -> FollowPage:
-        """The page Follow; see ``recordings_page``."""
-        page, run = FollowPage(self.session), self.run_page
-        page.play_sequence.connect(self._play_file)
-        page.use_model.connect(run.show_model)
-        page.hold.play_hold.connect(self._play_hold)
-        run.started.connect(page.hold.watch)
-        run.runner.ended.connect(page.hold.run_ended)
-        page.waits.connect(run.follow_button.setVisible)
-        return self._put("follow_page", page)
-
-    def _put(self, name: str, page: _AnyPage) -> _AnyPage:
-        """Put the page ``name`` into its place, which is empty and not shown."""
-        row = list(_PAGES).index(name)
+    def _put(self, page: Page) -> None:
+        """Put a new page into its place, which is empty and not shown, and serve its signals."""
+        kind = type(page)
+        self._pages[kind] = page
+        row = PAGES.index(kind)
         place = cast(QWidget, self.stack.widget(row))
         self.stack.insertWidget(row, page)
         self.stack.removeWidget(place)
         place.deleteLater()
-        return page
-
-    def _page(self, row: int) -> QWidget:
-        page: QWidget = getattr(self, list(_PAGES)[row])
-        return page
-
-    def _made(self, *names: str) -> list[Any]:
-        """Return those of the pages with these attributes' ``names`` that have been made."""
-        return [vars(self)[name] for name in names if name in vars(self)]
+        page.go_to.connect(self._show_page_titled)
+        page.show_recording.connect(self._show_recording)
+        page.edit_sequence.connect(self._edit_sequence)
+        page.play_sequence.connect(self._play_sequence)
+        page.play_hold.connect(self._play_hold)
+        page.use_model.connect(lambda path: self.run_page.show_model(path))
 
     # commands
 
@@ -164,10 +118,9 @@ class MainWindow(QMainWindow):
         """Bring ``page`` to the front."""
         self.list.setCurrentRow(self.stack.indexOf(page))
 
+    @Slot(str)
     def _show_page_titled(self, title: str) -> None:
-        titles = [page.title for page in _PAGES.values()]
-        if title in titles:
-            self.list.setCurrentRow(titles.index(title))
+        self.list.setCurrentRow([page.title for page in PAGES].index(title))
 
     @Slot()
     def show_guide(self) -> None:
@@ -182,9 +135,7 @@ class MainWindow(QMainWindow):
         """Give all parts the sizes and places of the first start."""
         for key in ("geometry", "page", GROUP):
             self.session.settings.remove(key)
-        for page in self._made(
-            "sequence_page", "recordings_page", "study_page", "follow_page", "campaign_page"
-        ):
+        for page in self._pages.values():
             page.reset_layout()
         self._default_geometry()
         self.show_page(self.run_page)
@@ -222,15 +173,13 @@ class MainWindow(QMainWindow):
         self.session.recovery.close(keep=self._by_signal)
         self._save_state()
         self.stop_keys.watch(False)
-        self.run_page.close_work()
+        self.run_page.close_work()  # first: the rig is made safe
         self.compilation.close()
         self.bar.close_work()
         self.planner.close()
-        for page in self._made(
-            "rig_page", "sequence_page", "recordings_page", "study_page", "follow_page",
-            "campaign_page",
-        ):  # fmt: skip
-            page.close_work()
+        for page in self._pages.values():
+            if page is not self.run_page:
+                page.close_work()
         self.library.close()
         event.accept()
 
@@ -245,16 +194,12 @@ class MainWindow(QMainWindow):
 
     def offer_unsaved(self) -> None:
         """Offer the unsaved texts of a window that ended without a question."""
-        offer_unsaved(
-            self,
-            self.session,
-            {
-                "sequence": self.sequence_page.restore,
-                "rig file": self.rig_page.restore,
-                "target": lambda text, file: self.follow_page.target.restore(text, file),
-                "plan": self.campaign_page.plan.restore,
-            },
-        )
+        kinds = {kind.edits: kind for kind in PAGES if kind.edits}
+
+        def restore(text: str, file: TextFile) -> None:
+            self.page(kinds[file.what]).restore(text, file)
+
+        offer_unsaved(self, self.session, dict.fromkeys(kinds, restore))
 
     def _ask_to_close(self) -> bool:
         """Stop the run and return True if the window is to close afterwards."""
@@ -279,20 +224,23 @@ class MainWindow(QMainWindow):
 
     # layout
 
-    def _build(self) -> None:
+    def _make_list(self) -> None:
         self.list = QListWidget()
         self.list.setObjectName("pages")
         self.list.setFixedWidth(132)
         self.list.setAccessibleName("Pages")
         self.stack = QStackedWidget()
-        for place, (name, known) in enumerate(_PAGES.items()):
-            self.list.addItem(known.title)
-            self.list.item(place).setToolTip(f"{known.title} ({known.shortcut})")
-            self.stack.addWidget(vars(self).get(name) or QWidget())
+        for place, kind in enumerate(PAGES):
+            shortcut = f"Ctrl+{place + 1}"
+            self.list.addItem(kind.title)
+            self.list.item(place).setToolTip(f"{kind.title} ({shortcut})")
+            self.stack.addWidget(QWidget())
             key = QAction(self)
-            key.setShortcut(QKeySequence(known.shortcut))
+            key.setShortcut(QKeySequence(shortcut))
             key.triggered.connect(lambda _=False, row=place: self.list.setCurrentRow(row))
             self.addAction(key)
+
+    def _build(self) -> None:
         self.list.currentRowChanged.connect(self._page_changed)
         side = QVBoxLayout()
         side.setContentsMargins(0, 0, 0, 0)
@@ -364,18 +312,12 @@ class MainWindow(QMainWindow):
         run.runner.ended.connect(self._run_ended, Qt.ConnectionType.QueuedConnection)
         session.recovery.changed.connect(self._unsaved_changed)
         self._unsaved_changed()
-        run.show_sequence.connect(lambda: self.show_page(self.sequence_page))
-        run.show_recording.connect(self._show_recording)
         session.rig_changed.connect(self._rig_or_folder_changed)
         session.folder_changed.connect(self._rig_or_folder_changed)
-        self.rig_page.output_read.connect(run.runner.status.set_read_at_rest)
         session.message.connect(self.status.setText)
         self.compilation.running_changed.connect(self.planner.hold)
         self.compilation.failed.connect(lambda words: run.alarms.add("warning", words))
         self.planner.progressed.connect(self.sequence_page.preview.show_progress)
-        self.sequence_page.show_run.connect(lambda: self.show_page(run))
-        self.campaign_page.show_recording.connect(self._show_recording)
-        run.show_follow.connect(lambda: self.show_page(self.follow_page))
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
         session.running_changed.connect(self._watch_keys)
         self.addActions(run.display.mark_bar.actions())  # the key M on every page
@@ -388,7 +330,7 @@ class MainWindow(QMainWindow):
 
     def _title(self) -> str:
         """Return the title of the page that is shown."""
-        return list(_PAGES.values())[self.list.currentRow()].title
+        return PAGES[self.list.currentRow()].title
 
     @Slot()
     def _watch_keys(self) -> None:
@@ -405,43 +347,25 @@ class MainWindow(QMainWindow):
 
     @Slot(int)
     def _page_changed(self, row: int) -> None:
-        self.stack.setCurrentWidget(self._page(row))
+        self.stack.setCurrentWidget(self.page(PAGES[row]))
         self.session.settings.setValue("page", row)
-
-    @Slot(object)
-    def _study_finished(self, _finished: object) -> None:
-        for page in self._made("follow_page"):
-            page.model.find_studies()
-            page.hold.model.find_studies()
 
     @Slot(Path)
     def _show_recording(self, path: Path) -> None:
-        self.recordings_page.choose([path])
-        self.show_page(self.recordings_page)
+        recordings = self.page(RecordingsPage)
+        recordings.choose([path])
+        self.show_page(recordings)
 
     @Slot(str)
-    def _read_sequence(self, toml: str) -> None:
+    def _edit_sequence(self, toml: str) -> None:
         if self.sequence_page.take(toml):
             self.show_page(self.sequence_page)
 
-    @Slot(str)
-    def _play_sequence(self, toml: str) -> None:
-        """Show a proposed experiment on the Run page; the operator arms it as usual."""
-        if self.sequence_page.take(toml):
+    @Slot(str, object)
+    def _play_sequence(self, toml: str, path: Path | None) -> None:
+        """Show the sequence ``toml``, of the file ``path``, on the Run page, to arm it as usual."""
+        if self.sequence_page.take(toml, path):
             self.show_page(self.run_page)
-
-    @Slot(Path)
-    def _play_file(self, path: Path) -> None:
-        """Show the sequence in the file ``path`` on the Run page; the operator arms it as usual."""
-        if not self.sequence_page.may_replace():
-            return
-        try:
-            toml = read_text(path, "sequence")
-        except InputError as error:
-            self.follow_page.message.show_text(str(error))
-            return
-        self.session.set_sequence(toml, path.parent, path)
-        self.show_page(self.run_page)
 
     @Slot(object)
     def _play_hold(self, hold: HoldPlan) -> None:
@@ -449,11 +373,6 @@ class MainWindow(QMainWindow):
         if self.sequence_page.take(hold.sequence.toml):
             self.session.set_hold(hold)
             self.show_page(self.run_page)
-
-    @Slot(Path)
-    def _show_model(self, path: Path) -> None:
-        self.run_page.show_model(path)
-        self.show_page(self.run_page)
 
     def set_colour_scheme(self, name: str) -> None:
         """Use the colour scheme ``system``, ``light`` or ``dark``."""
@@ -480,7 +399,7 @@ class MainWindow(QMainWindow):
             self._default_geometry()
         # the first start shows the Run page: a simulated rig is ready to be armed
         row = kept_number(settings, "page", self.stack.indexOf(self.run_page))
-        self.list.setCurrentRow(min(max(row, 0), len(_PAGES) - 1))
+        self.list.setCurrentRow(min(max(row, 0), len(PAGES) - 1))
 
     def _default_geometry(self) -> None:
         available = QGuiApplication.primaryScreen().availableSize()

@@ -6,7 +6,7 @@ import math
 import shutil
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtCore import Qt, Slot
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -39,6 +39,7 @@ from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, menu_button, plain_tip, set_role
 from dearig.window.recordings.library import shared_library
 from dearig.window.session.layout_state import remember
+from dearig.window.session.page import Page
 from dearig.window.session.state import Session
 from dearig.window.study.before_after_plot import BeforeAfterPlot
 from dearig.window.study.residual_plots import ResidualPlots
@@ -58,21 +59,13 @@ _LEFT = 330  # px, default width of the left column
 _LISTED_MAX = 30  # studies in the menu; a longer one does not fit on a screen
 
 
-class StudyPage(QWidget):
-    """Fits models to the recordings of the session's folder, in a process of its own.
-
-    ``open_sequence`` carries the proposed experiment, to be armed and run; ``show_model`` a model
-    file to use as overlay; ``study_finished`` a ``Study`` as soon as it is shown.
-    """
+class StudyPage(Page):
+    """Fits models to the recordings of the session's folder, in a process of its own."""
 
     title = "Study"
-    shortcut = "Ctrl+5"
-    open_sequence = Signal(str)
-    show_model = Signal(Path)
-    study_finished = Signal(object)
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(session, parent)
         self._session = session
         self._library = shared_library(session)
         self._worker = Worker(self)
@@ -344,7 +337,7 @@ class StudyPage(QWidget):
     def show_study(self, found: Study) -> None:
         """Show a result that has just been made."""
         self.show_view(view_of(found))
-        self.study_finished.emit(found)
+        self._session.study_finished.emit(found)
         self.find_studies()
 
     def show_view(self, shown: StudyView) -> None:
@@ -413,7 +406,8 @@ class StudyPage(QWidget):
     @Slot()
     def _use(self) -> None:
         if self._shown is not None:
-            self.show_model.emit(self._shown.model)
+            self.use_model.emit(self._shown.model)
+            self.go_to.emit("Run")
             self.message.show_text(
                 "The next run shows this model as an overlay. Remove it on the page Run.", "good"
             )
@@ -449,7 +443,7 @@ class StudyPage(QWidget):
     def _run(self) -> None:
         proposed = self.proposed()
         if proposed is not None:
-            self.open_sequence.emit(proposed)
+            self.play_sequence.emit(proposed, None)
 
 
 #: Text of the page before the first result.

@@ -20,9 +20,9 @@ from dearig.report.text.trends import (
     effect_table,
     number_name,
     own_table,
-    proposal_sentences,
+    proposal_texts,
     trend_title,
-    trends_sentences,
+    trends_texts,
 )
 from dearig.window.documents.dialogs import choose_file, save_as
 from dearig.window.jobs.background import Background
@@ -154,8 +154,8 @@ class TrendsPanel(QWidget):
             for name in sorted(set(trends.films), key=str.casefold):
                 self.film.addItem(name or "(film without a name)", name)
         tables = (effect_table(trends), own_table(trends), change_table(trends))
-        pieces: list[str | Table] = [*trends_sentences(trends)]
-        pieces += [Table("What to vary next", (("", ""),), ()), *proposal_sentences(trends)]
+        pieces: list[str | Table] = [*trends_texts(trends)]
+        pieces += [Table("What to vary next", (("", ""),), ()), *proposal_texts(trends)]
         pieces += [table for table in tables if table is not None]
         self.page.show_pieces(pieces)
         self._another_number()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise
-from dearig.analysis.readings.record import as_record, compare, noise_sentences
+from dearig.analysis.readings.record import as_record, compare, noise_texts
 from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Network
 from dearig.model.simulation.actuator import Actuator
 from dearig.recording import RunMetadata, import_file, open_recording
@@ -63,7 +63,7 @@ def test_info_fits_and_comparisons_agree(tmp_path: Path, rest: float, source: st
     assert told["noise_floor_m"] == as_record(run).noise == compared.noise
     assert told["noise_floor_m"] == pytest.approx(NOISE, rel=0.2)
     assert told["noise_from"] == compared.noise_source == noise_from([compared]) == source
-    row, sentences = dict(describe_rows(run))["noise floor"], noise_sentences([run])
+    row, sentences = dict(describe_rows(run))["noise floor"], noise_texts([run])
     if source == "lead-in":
         assert "over 101 samples at 0 V" in row
         assert sentences == []
@@ -89,16 +89,16 @@ def test_coarse_readings_tell_neither_noise_nor_zero_at_rest(tmp_path: Path, at:
     off = float(np.mean(record.displacement[moving] - true[moving]))
     # 200 readings of 4 um have a mean to 0.3 um, and the zero is known to a part of the noise
     assert abs(off) < 0.6 * NOISE
-    row, sentences = dict(describe_rows(run))["noise floor"], noise_sentences([run])
+    row, sentences = dict(describe_rows(run))["noise floor"], noise_texts([run])
     assert "in steps larger than their noise" in row
     assert "the zero of displacement is known to a part of a step only" in sentences[0]
 
 
 def test_what_moves_slowly_at_rest_is_said(tmp_path: Path) -> None:
     still = recorded(tmp_path, 2.0)
-    assert noise_sentences([still]) == []
+    assert noise_texts([still]) == []
     swinging = recorded(tmp_path, 2.0, swing=6.0 * NOISE)
-    (sentence,) = noise_sentences([swinging])
+    (sentence,) = noise_texts([swinging])
     # a swing of 12 um is 8.5 um RMS
     assert "the readings at rest move slowly, by 8." in sentence
     assert "in addition to a noise of 2." in sentence

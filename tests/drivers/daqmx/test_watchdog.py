@@ -6,7 +6,7 @@ import pytest
 
 from dearig.acquisition.check import check_rig
 from dearig.config.rigfile import RigFile, load_rig_file
-from dearig.drivers.daqmx.watchdog import WATCHDOG, watchdog_words
+from dearig.drivers.daqmx.watchdog import WATCHDOG, watchdog_text
 from dearig.errors import InputError
 from dearig.sim_backend.daqmx.properties import attributes
 from tests.tools.command import LOBE, dearig, done, refused, write
@@ -137,5 +137,5 @@ def test_a_line_without_a_time_has_the_default_watchdog_and_zero_has_none():
     assert RigFile.model_validate({"card": wired}).card.watchdog_s == 1.0
     off = RigFile.model_validate({"card": {**wired, "hv_enable_watchdog_s": 0.0}}).card
     assert off.watchdog_s == 0.0
-    assert NO_WATCHDOG in watchdog_words(off, simulated=False)
+    assert NO_WATCHDOG in watchdog_text(off, simulated=False)
     assert RigFile().card.watchdog_s == 0.0

@@ -142,7 +142,7 @@ def test_a_search_keeps_what_it_has_fitted_when_its_work_ends(monkeypatch) -> No
 
     def race_once(*given):
         if races:
-            raise engine.Spent
+            raise engine.BudgetExhausted
         races.append(given)
         return race(*given)
 
@@ -158,8 +158,8 @@ def test_a_fit_in_which_the_work_ended_is_made_again(monkeypatch) -> None:
     problem = fitter.problem(plant("sensor curvature"))
     fit = fitter.descend(problem, problem.layout.coordinates(problem.layout.initial()), 3)
     with monkeypatch.context() as ended:
-        ended.setattr(fitter, "watched", Mock(side_effect=engine.Spent))
-        with pytest.raises(engine.Spent):
+        ended.setattr(fitter, "watched", Mock(side_effect=engine.BudgetExhausted))
+        with pytest.raises(engine.BudgetExhausted):
             search.without(fit, "sensor curvature")
     assert search.without(fit, "sensor curvature").effects == ()
 

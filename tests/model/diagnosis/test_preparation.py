@@ -61,7 +61,7 @@ def test_a_spike_in_ringing_is_told_by_the_model() -> None:
     found = without_spikes(record, spiky)
     assert found.valid is not None
     assert np.flatnonzero(~found.valid).tolist() == places
-    # bridged along the model
+    # interpolated along the model
     assert np.max(np.abs((found.displacement - rings)[places])) < 3e-6
     assert np.array_equal(found.displacement[found.valid], record.displacement[found.valid])
     assert without_spikes(record_with(rings + noise), noise).valid is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dearig.model.readings.denoise import quieted, reading_noise
+from dearig.model.readings.denoise import reading_noise, smoothed
 from tests.tools.engine import thesis_drive
 
 NOISES = [1.0, 5.0, 20.0]  # V
@@ -60,7 +60,7 @@ def test_where_there_is_no_noise_to_be_read():
 @pytest.mark.parametrize(("rate", "left"), [(1000.0, 0.25), (2000.0, 0.2), (100.0, 0.45)])
 def test_smooth_lobes_are_quieter(rate, left, noise):
     course = thesis_drive(rate).voltage
-    found = quieted(readings(course, noise), noise)
+    found = smoothed(readings(course, noise), noise)
     assert rms(found - course) < left * noise
     # corners between lobes and all
     assert np.abs(found - course).max() < 5.0 * noise
@@ -70,7 +70,7 @@ def test_smooth_lobes_are_quieter(rate, left, noise):
 @pytest.mark.parametrize("course", [STEPS, TRIANGLES], ids=["steps", "triangles"])
 def test_edges_stay(course, noise):
     noisy = readings(course, noise)
-    found = quieted(noisy, noise)
+    found = smoothed(noisy, noise)
     assert np.abs(found - course).max() < 4.5 * noise
     # the reading itself is no nearer to the truth, anywhere about an edge
     edges = np.flatnonzero(np.abs(np.diff(course, 2)) > 10.0) + 1
@@ -84,7 +84,7 @@ def test_a_ringing_is_not_taken_for_noise():
     # 60 Hz of 30 V on a lobe, at 1 kHz: a film would feel it
     drive = thesis_drive(1000.0)
     course = drive.voltage + 30.0 * np.sin(2.0 * np.pi * 60.0 * drive.time)
-    found = quieted(readings(course, 3.0), 3.0)
+    found = smoothed(readings(course, 3.0), 3.0)
     assert rms(found - course) < 3.0
     # what is taken off it is less than the noise
     line = np.exp(-2j * np.pi * 60.0 * drive.time)
@@ -93,19 +93,19 @@ def test_a_ringing_is_not_taken_for_noise():
 
 def test_without_noise_nothing_changes():
     for course in (STEPS, TRIANGLES, thesis_drive(1000.0).voltage, readings(STEPS, 5.0)):
-        found = quieted(course, 0.0)
+        found = smoothed(course, 0.0)
         np.testing.assert_array_equal(found, course)
         assert found is not course
 
 
 def test_what_is_shorter_than_a_window_stays():
     short = readings(np.zeros(7), 5.0)
-    np.testing.assert_array_equal(quieted(short, 5.0), short)
-    assert np.all(np.isfinite(quieted(readings(np.zeros(8), 5.0), 5.0)))
+    np.testing.assert_array_equal(smoothed(short, 5.0), short)
+    assert np.all(np.isfinite(smoothed(readings(np.zeros(8), 5.0), 5.0)))
 
 
 def test_the_readings_themselves_are_left_alone():
     noisy = readings(STEPS, 5.0)
     kept = noisy.copy()
-    quieted(noisy, 5.0)
+    smoothed(noisy, 5.0)
     np.testing.assert_array_equal(noisy, kept)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dearig.model.readings.environment import air_sentences, recorded_of
+from dearig.model.readings.environment import air_texts, recorded_of
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def test_effects_of_the_air_need_recordings_that_differ(
     ],
 )
 def test_what_recordings_cannot_show_is_said(humidities: list, words: list[str]) -> None:
-    said = list(air_sentences([None] * len(humidities), humidities))
+    said = list(air_texts([None] * len(humidities), humidities))
     assert len(said) == len(words)
     for sentence, part in zip(said, words, strict=True):
         assert part in sentence

@@ -10,7 +10,7 @@ import pytest
 from dearig.batch.table_file import read_table, write_csv
 from dearig.report.figures.data import csv_url, figure_columns, to_csv
 from dearig.report.figures.recordings import comparison_figure, overview_figure
-from dearig.report.figures.residual import bin_words, residual_panels
+from dearig.report.figures.residual import bin_text, residual_panels
 from tests.tools.reports import NOISE, actuator_comparison, validation_runs
 
 
@@ -66,11 +66,11 @@ def test_bins_are_whole_converter_steps(step):
     assert widths.pop() % 1.0 == 0.0
     # between two steps, so that none lies on an edge
     assert bars[0].get_x() / (step * 1e6) % 1.0 == pytest.approx(0.5, abs=1e-6)
-    assert "converter step" in bin_words(comparison)
+    assert "converter step" in bin_text(comparison)
 
 
 def test_bins_of_readings_without_a_step_follow_the_spread():
-    assert bin_words(actuator_comparison()) == ""
+    assert bin_text(actuator_comparison()) == ""
     bars = residual_panels(actuator_comparison())[0].axes[0].containers[0].patches
     assert 12 <= len(bars) <= 60
     assert bars[0].get_width() < 4.0 * NOISE * 1e6

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dearig.analysis.outcomes import Stand
+from dearig.analysis.outcomes import Evaluation
 from dearig.analysis.tracking import TrackedRun, TrackOutcome
 from dearig.api.display import card, drawing, facts, table_html, write_page
 from dearig.batch.campaign import CampaignOutcome
@@ -99,7 +99,7 @@ def pages(folder: Path) -> list[Path]:
         ("note", "reason", "record", "evidence"),
     )
     stands = tuple(
-        Stand(stand.effects, (replace(stand.train[0], name=EVIL, origin=origin),), ())
+        Evaluation(stand.effects, (replace(stand.train[0], name=EVIL, origin=origin),), ())
         for stand in diagnosed.stands
     )
     experiment = hostile(diagnosed.experiment, ("name", "sequence"))

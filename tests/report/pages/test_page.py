@@ -21,7 +21,7 @@ from dearig.report.text.numbers import (
 )
 from dearig.report.text.sentences import (
     identify_summary,
-    undetermined_sentence,
+    undetermined_text,
     validate_summary,
     warnings_of,
 )
@@ -311,7 +311,7 @@ class TestWords:
 
     def test_doubts(self):
         assert (
-            undetermined_sentence(fit(estimates=(fit().estimates[2],)))
+            undetermined_text(fit(estimates=(fit().estimates[2],)))
             == "The data determine every parameter."
         )
 

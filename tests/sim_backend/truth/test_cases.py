@@ -13,7 +13,7 @@ from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.laser_noise import NOISES
 from dearig.sim_backend.truth import cases
 from dearig.sim_backend.truth.effects import drift
-from dearig.sim_backend.truth.second_hand import sensor
+from dearig.sim_backend.truth.generator_b import sensor
 
 #: The families that a diagnosis may name, as its JSON spells them.
 FAMILIES = {

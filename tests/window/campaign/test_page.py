@@ -22,7 +22,7 @@ from dearig.drivers.settings import CardSettings, LimitsSettings
 from dearig.errors import Interrupted
 from dearig.recording import open_recording
 from dearig.sim_backend.faults import FaultPlan
-from dearig.window.campaign.compute import ComputeApart
+from dearig.window.campaign.compute import ComputeProcess
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.jobs.worker_process import Response
@@ -296,7 +296,7 @@ def test_what_is_computed_after_a_run_is_ended_by_stop_and_its_faults_are_noted(
     (tmp_path / "lobe.toml").write_text(LOBE, "utf-8")
     campaign = parse_campaign(PLAN + "[after]\nidentify = true\n", "the plan", tmp_path)
     interrupts = Interrupts()
-    apart = ComputeApart(interrupts)
+    apart = ComputeProcess(interrupts)
     ours, theirs = Pipe()
     monkeypatch.setattr(apart, "_started", lambda: ours)
     stages: list[str] = []
@@ -321,7 +321,7 @@ def test_what_is_computed_after_a_run_is_ended_by_stop_and_its_faults_are_noted(
 def test_the_window_closes_in_a_campaign_at_zero_and_the_journal_goes_on(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:
-    page, runner = window.campaign_page, window.run_page.runner
+    page, runner = window.page(CampaignPage), window.run_page.runner
     window.session.set_rig_file(None, "", RIG)
     (tmp_path / "lobe.toml").write_text(LONG, "utf-8")
     write(page, PLAN, tmp_path)

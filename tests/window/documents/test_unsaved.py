@@ -12,8 +12,9 @@ from pytestqt.qtbot import QtBot
 
 from dearig.config.presets import PRESETS
 from dearig.window.documents.dialogs import ask
-from dearig.window.documents.questions import may_drop
+from dearig.window.documents.questions import confirm_discard
 from dearig.window.kit.theme import LIGHT
+from dearig.window.rig.page import RigPage
 from dearig.window.session.recovery import Recovery
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
@@ -28,7 +29,7 @@ def change(window: MainWindow) -> None:
     window.sequence_page.preset("rich")
     window.sequence_page.editor.choose(1)
     window.sequence_page.editor.set_value("duration_s", 2.0)
-    window.rig_page.set_value("limits", "voltage_max_kV", 5.0)
+    window.page(RigPage).set_value("limits", "voltage_max_kV", 5.0)
 
 
 def test_closing_asks_and_names_what_would_be_lost(window: MainWindow, answers: Answers) -> None:
@@ -51,7 +52,7 @@ def test_a_signal_keeps_unsaved_work_for_the_next_start(
 ) -> None:
     change(window)
     window.sequence_page.editor.draft.file.path = window.session.folder / "mine.toml"
-    toml, rig = window.sequence_page.draft.toml, window.rig_page.text
+    toml, rig = window.sequence_page.draft.toml, window.page(RigPage).text
     window.leave()
     assert not window.isVisible()
     assert answers.questions == []
@@ -65,7 +66,7 @@ def test_a_signal_keeps_unsaved_work_for_the_next_start(
     again.offer_unsaved()
     assert "sequence mine.toml (changed: segment 2 duration (s))" in answers.questions[1]
     assert again.sequence_page.draft.toml == session.sequence_toml == toml
-    assert again.rig_page.text == rig
+    assert again.page(RigPage).text == rig
     assert session.rig_file.limits.voltage_max_kV == 5.0
     assert again.sequence_page.file_name.text() == "● mine.toml (not saved)"
     assert again.isWindowModified()
@@ -111,7 +112,7 @@ def test_the_default_of_a_question_loses_nothing(
         qtbot.keyClick(box, Qt.Key.Key_Return)
 
     QTimer.singleShot(0, press)
-    assert not may_drop(page, window.session, page.draft.file, page.draft.toml)
+    assert not confirm_discard(page, window.session, page.draft.file, page.draft.toml)
     assert pressed == ["Cancel"]
     monkeypatch.setattr("dearig.window.documents.questions.ask", answers)
     answers.next = True

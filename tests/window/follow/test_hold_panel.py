@@ -45,7 +45,7 @@ def page(session: Session, keep: Callable[[QWidget], None]) -> FollowPage:
 def test_a_hold_is_checked_armed_on_run_watched_and_measured(
     qtbot: QtBot, window: MainWindow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session, run, page = window.session, window.run_page, window.follow_page
+    session, run, page = window.session, window.run_page, window.page(FollowPage)
     session.set_rig_file(None, "", RIG)
     page.hold.worker = Here(page)
     window.show_page(page)

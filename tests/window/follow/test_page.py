@@ -79,7 +79,7 @@ def words(widget: QWidget) -> str:
 def test_runs_are_shown_armed_one_by_one_stopped_and_learned_from(
     qtbot: QtBot, window: MainWindow, quick_ramp: Session
 ) -> None:
-    session, page, run = window.session, window.follow_page, window.run_page
+    session, page, run = window.session, window.page(FollowPage), window.run_page
     page._worker = Here(page)
     session.set_address("sim:8")
     session.set_rig_file(None, "", RIG)
@@ -171,7 +171,8 @@ def test_what_cannot_be_followed_is_shown_before_anything_is_played(
     assert page.run_button.isEnabled()
     with qtbot.waitSignal(page.play_sequence) as told:
         click(qtbot, page.run_button)
-    assert told.args == [page._session.folder / "follow-1" / "model.toml"]
+    file = page._session.folder / "follow-1" / "model.toml"
+    assert told.args == [file.read_text(encoding="utf-8"), file]
 
 
 def test_the_gate_refuses_before_a_run_is_shown(qtbot: QtBot, page: FollowPage) -> None:

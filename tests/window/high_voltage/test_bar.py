@@ -17,6 +17,7 @@ from dearig.recording.verify import verify
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage, kilovolts
 from dearig.window.high_voltage.status import HighVoltageStatus, LatchedAlarm
+from dearig.window.rig.page import RigPage
 from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
@@ -63,7 +64,7 @@ def test_the_bar_shows_the_monitor_and_the_time_and_greys_what_was_read_after_it
     page.paced.setChecked(True)
     press(qtbot, page.arm_button)
     press(qtbot, page.start_button)
-    window.show_page(window.rig_page)
+    window.show_page(window.page(RigPage))
     qtbot.waitUntil(
         lambda: float(bar.monitor.text().split()[0].replace("—", "0")) > 1.0, timeout=RUN_MS
     )

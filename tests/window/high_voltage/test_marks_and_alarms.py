@@ -14,6 +14,7 @@ from dearig.recording import open_recording
 from dearig.recording.reading.marks import Mark, marks_in
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.alarms import AcknowledgeBar, AlarmLog, AlarmTable
+from dearig.window.recordings.page import RecordingsPage
 from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
@@ -90,7 +91,7 @@ def test_m_marks_from_every_page_and_the_button_does_the_same(
 def test_a_note_without_a_mark_sets_one_and_text_fields_keep_their_letters(
     qtbot: QtBot, window: MainWindow, going: RunPage
 ) -> None:
-    window.show_page(window.recordings_page)
+    window.show_page(window.page(RecordingsPage))
     window.show_page(going)
     note = going.display.mark_bar.note
     stroke(qtbot, window, Qt.Key.Key_N)

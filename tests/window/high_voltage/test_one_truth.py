@@ -13,6 +13,7 @@ from dearig.config.rigfile import RigFile
 from dearig.output_state import Known, OutputState
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.high_voltage.status import Reading
+from dearig.window.rig.page import RigPage
 from dearig.window.run.live import RunSnapshot
 from dearig.window.shell.frame import MainWindow
 from tests.window.conftest import SHORT, press
@@ -138,8 +139,8 @@ def test_a_check_that_has_read_0_volts_clears_not_read_yet(
 ) -> None:
     bar = window.bar
     assert "was not read" in bar.detail.text()
-    window.show_page(window.rig_page)
-    qtbot.waitUntil(lambda: window.rig_page.outcome is not None, timeout=RUN_MS)
+    window.show_page(window.page(RigPage))
+    qtbot.waitUntil(lambda: window.page(RigPage).outcome is not None, timeout=RUN_MS)
     assert bar.badge.state is HighVoltage.CONFIRMED
     assert "0 V confirmed by the monitor at" in bar.detail.text()
     assert bar.monitor.text() == "0.00 kV"
@@ -149,7 +150,7 @@ def test_a_check_that_has_read_0_volts_clears_not_read_yet(
 
 
 def test_a_check_of_a_rig_that_was_left_says_nothing(qtbot: QtBot, window: MainWindow) -> None:
-    page = window.rig_page
+    page = window.page(RigPage)
     page.check()
     window.session.set_address("sim:3")
     qtbot.waitUntil(lambda: not page._checks.busy, timeout=RUN_MS)

@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from dearig.window.campaign.page import CampaignPage
 from dearig.window.high_voltage.responsiveness import REACTION
 from dearig.window.shell.frame import MainWindow
 from tests.window.conftest import press
@@ -100,12 +101,12 @@ def test_a_start_that_waited_in_the_queue_is_dropped(qtbot: QtBot, window: MainW
 
 
 def test_a_campaign_is_started_by_what_was_seen_too(qtbot: QtBot, window: MainWindow) -> None:
-    controls = window.campaign_page.controls
-    window.show_page(window.campaign_page)
+    controls = window.page(CampaignPage).controls
+    window.show_page(window.page(CampaignPage))
     controls.operator.setText("Ada")
     press(qtbot, controls.arm)
     qtbot.mouseClick(controls.start, LEFT)
-    window.campaign_page.start()
+    window.page(CampaignPage).start()
     assert not window.run_page.runner.running
     qtbot.waitUntil(controls.start.isEnabled)
     busy(2 * REACTION)

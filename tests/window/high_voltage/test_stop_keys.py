@@ -12,8 +12,11 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.window.high_voltage.state import HighVoltage
+from dearig.window.recordings.page import RecordingsPage
+from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from dearig.window.study.page import StudyPage
 from tests.window.conftest import SHORT, press
 
 LEFT = Qt.MouseButton.LeftButton
@@ -27,8 +30,8 @@ def places(window: MainWindow) -> list[QWidget]:
     return [
         run.start_button, run.arm_button, run.operator, run.paced, run.overlays.models[0],
         run.display.table, run.display.mark_bar.button, run.plots, window.list,
-        window.sequence_page.editor.table, window.rig_page.tabs,
-        window.recordings_page, window.study_page, window,
+        window.sequence_page.editor.table, window.page(RigPage).tabs,
+        window.page(RecordingsPage), window.page(StudyPage), window,
     ]  # fmt: skip
 
 
@@ -81,8 +84,8 @@ def test_a_run_that_a_key_stops_says_which_one_and_where(
 ) -> None:
     page, status = window.run_page, window.run_page.runner.status
     for key, name, other in (
-        (Qt.Key.Key_Escape, "Esc", window.recordings_page),
-        (Qt.Key.Key_Space, "Space", window.study_page),
+        (Qt.Key.Key_Escape, "Esc", window.page(RecordingsPage)),
+        (Qt.Key.Key_Space, "Space", window.page(StudyPage)),
     ):
         window.show_page(page)
         begin(qtbot, window)
@@ -105,7 +108,7 @@ def test_every_other_stop_is_named_too(
 ) -> None:
     page, bar = window.run_page, window.bar
     begin(qtbot, window)
-    window.show_page(window.study_page)
+    window.show_page(window.page(StudyPage))
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS):
         qtbot.mouseClick(bar.stop_button, LEFT)
     assert "stopped by STOP on Study, " in bar.detail.text()
@@ -122,10 +125,10 @@ def test_every_other_stop_is_named_too(
 def test_a_space_writes_where_a_text_field_has_the_focus(
     qtbot: QtBot, quick_ramp: Session, window: MainWindow
 ) -> None:
-    page, search = window.run_page, window.recordings_page.filter
+    page, search = window.run_page, window.page(RecordingsPage).filter
     begin(qtbot, window)
     note = page.display.mark_bar.note
-    for other, field in ((page, note), (window.recordings_page, search)):
+    for other, field in ((page, note), (window.page(RecordingsPage), search)):
         window.show_page(other)
         field.setFocus()
         qtbot.keyClicks(field, " lamp  on ")
@@ -153,7 +156,7 @@ def test_a_space_does_not_write_where_nothing_can_be_written(
 def test_esc_closes_what_is_open_before_it_stops(
     qtbot: QtBot, quick_ramp: Session, window: MainWindow
 ) -> None:
-    page, search = window.run_page, window.recordings_page.filter
+    page, search = window.run_page, window.page(RecordingsPage).filter
     begin(qtbot, window)
     # the guide
     window.show_guide()
@@ -176,7 +179,7 @@ def test_esc_closes_what_is_open_before_it_stops(
         )  # fmt: skip
     assert QApplication.activePopupWidget() is None
     # a search text
-    window.show_page(window.recordings_page)
+    window.show_page(window.page(RecordingsPage))
     search.setFocus()
     search.setText("film 7")
     qtbot.keyClick(search, Qt.Key.Key_Escape)
@@ -185,7 +188,7 @@ def test_esc_closes_what_is_open_before_it_stops(
     window.show_page(window.sequence_page)
     assert page.runner.state is HighVoltage.ON
     # and where nothing is open, the run
-    window.show_page(window.recordings_page)
+    window.show_page(window.page(RecordingsPage))
     search.setFocus()
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS):
         qtbot.keyClick(search, Qt.Key.Key_Escape)

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
 from dearig.window.high_voltage.state import HighVoltage
+from dearig.window.rig.page import RigPage
 from dearig.window.shell.frame import MainWindow
 
 
@@ -24,7 +25,7 @@ def test_a_block_refuses_arming_and_says_why_on_every_page(
         assert window.banners.isVisible()
     go = next(b for b in window.banners.findChildren(QPushButton) if b.isVisible())
     qtbot.mouseClick(go, Qt.MouseButton.LeftButton)
-    assert window.rig_page.isVisible()
+    assert window.page(RigPage).isVisible()
 
     session.unblock("voltage_max")
     assert not window.banners.isVisible()

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from dearig.window.imports.dialog import ImportDialog
+from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from tests.window.imports.test_dialog import Here, settled
@@ -107,7 +108,7 @@ def test_no_field_of_the_import_dialog_changes_by_the_wheel(
 
 
 def test_the_page_scrolls_under_the_pointer_instead(qtbot: QtBot, window: MainWindow) -> None:
-    page = window.rig_page
+    page = window.page(RigPage)
     window.show_page(page)
     page.show_table("interlocks")
     field = next(f for f in fields(page.form("interlocks")) if isinstance(f, QComboBox))
@@ -123,9 +124,9 @@ def test_the_page_scrolls_under_the_pointer_instead(qtbot: QtBot, window: MainWi
 
 
 def test_a_field_with_the_focus_answers_the_wheel(qtbot: QtBot, window: MainWindow) -> None:
-    field = window.rig_page.seed
-    window.show_page(window.rig_page)
-    window.rig_page.kinds.button(1).click()
+    field = window.page(RigPage).seed
+    window.show_page(window.page(RigPage))
+    window.page(RigPage).kinds.button(1).click()
     field.setFocus(Qt.FocusReason.MouseFocusReason)
     before = field.value()
     turn(field, -DOWN)

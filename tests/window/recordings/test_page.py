@@ -156,7 +156,7 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
     # the sequence of one of them, to be played again
     page.choose([folder / "low.h5"])
     drawn(page, qtbot, "low")
-    with qtbot.waitSignal(page.open_sequence) as told:
+    with qtbot.waitSignal(page.edit_sequence) as told:
         click(qtbot, page.sequence_button)
     assert 'name = "lobes of 4.0 kV"' in told.args[0]
 

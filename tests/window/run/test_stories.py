@@ -25,6 +25,7 @@ from dearig.recording import open_recording
 from dearig.recording.reading.recording import Recording
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
+from dearig.window.rig.page import RigPage
 from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
@@ -189,10 +190,10 @@ def test_stop_by_key_from_another_page(qtbot: QtBot, window: MainWindow, key: Qt
     page.paced.setChecked(True)
     press(qtbot, page.arm_button)
     press(qtbot, page.start_button)
-    window.show_page(window.rig_page)
+    window.show_page(window.page(RigPage))
     qtbot.waitUntil(lambda: seconds(page) > 0.0, timeout=RUN_MS)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
-        qtbot.keyClick(window.rig_page, key)
+        qtbot.keyClick(window.page(RigPage), key)
     assert ended.args[0].headline == "Stopped"
 
 

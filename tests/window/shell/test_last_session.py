@@ -12,6 +12,7 @@ from dearig.config.modelfile import save_model
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator
 from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.recordings.page import RecordingsPage
 from dearig.window.run.overlay_chooser import read_overlay
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
@@ -115,7 +116,7 @@ def test_an_armed_window_starts_disarmed_on_the_rig_that_is_asked_for(
     session.set_address("sim:7")
     window = MainWindow(session)
     qtbot.addWidget(window)
-    window.show_page(window.recordings_page)
+    window.show_page(window.page(RecordingsPage))
     session.set_armed(True)
     crash(session)
     kept = QSettings(str(ini), QSettings.Format.IniFormat)
@@ -126,7 +127,7 @@ def test_an_armed_window_starts_disarmed_on_the_rig_that_is_asked_for(
     again, _ = start(ini, tmp_path)
     second = MainWindow(again)
     qtbot.addWidget(second)
-    assert second.stack.currentWidget() is second.recordings_page
+    assert second.stack.currentWidget() is second.page(RecordingsPage)
     assert again.address == "sim"
     assert not again.armed
     assert not second.run_page.runner.running

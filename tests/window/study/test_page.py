@@ -59,7 +59,7 @@ def click(qtbot: QtBot, widget: QWidget) -> None:
 
 def studied(page: StudyPage, qtbot: QtBot) -> Study:
     """Press Start, and wait for what is found."""
-    with qtbot.waitSignal(page.study_finished, timeout=_PATIENCE) as told:
+    with qtbot.waitSignal(page._session.study_finished, timeout=_PATIENCE) as told:
         click(qtbot, page.start)
     found: Study = told.args[0]
     return found
@@ -102,7 +102,7 @@ def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path
     assert load_model(tmp_path / "mine.toml").name == load_model(found.model).name
     page.save(tmp_path / "gone" / "mine.toml")
     assert "cannot be written: there is no folder" in page.message.text()
-    with qtbot.waitSignal(page.show_model) as told:
+    with qtbot.waitSignal(page.use_model) as told:
         click(qtbot, page.overlay_button)
     assert told.args == [found.model]
     assert not page.run_button.isEnabled()
@@ -196,7 +196,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     session.set_rig_file(None, "", SLOW_RIG)
     session.set_address(address)
     path = of_rig(session.folder, "thesis", address)
-    page, run = window.study_page, window.run_page
+    page, run = window.page(StudyPage), window.run_page
     window.show_page(page)
     page._library.refresh()
     listed(page, qtbot)

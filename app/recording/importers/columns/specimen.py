@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from dearig.recording.importers.quantities.units import UNITS, unit_of
 
-__all__ = ["Specimen", "specimen_told"]
+__all__ = ["Specimen", "specimen_from_header"]
 
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
 _IN_NAME = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s*:?\s*")
@@ -38,7 +38,7 @@ class Specimen:
     area_mm2: float | None = None
 
 
-def specimen_told(block: Sequence[Sequence[str]]) -> Specimen:
+def specimen_from_header(block: Sequence[Sequence[str]]) -> Specimen:
     """Return the size that the cells ``block`` of the lines above a table tell.
 
     It is a proposal: the lines may be those of another specimen. Sizes without a unit are left out.

@@ -12,7 +12,7 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.recording.content.timestamps import not_forward
 from dearig.recording.importers.columns.chosen import Chosen, Pick
-from dearig.recording.importers.columns.specimen import Specimen, specimen_told
+from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
 from dearig.recording.importers.quantities.clock_numbers import by_sixties
 from dearig.recording.importers.quantities.labels import names_of, suggestion
 from dearig.recording.importers.source import GapError, NeedsOptionError, listing
@@ -120,7 +120,7 @@ def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[s
 
     Raises ``NeedsOptionError`` for a size of the specimen that is missing, for both at once.
     """
-    there, told = chosen.picked, specimen_told(getattr(chosen.source, "block", ()))
+    there, told = chosen.picked, specimen_from_header(getattr(chosen.source, "block", ()))
     length = next((q for q in ("stretch", "strain", "displacement") if q in there), None)
     pull = next((q for q in ("nominal_stress", "force") if q in there), None)
     if length is None:
