@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import subprocess
+import sys
 from collections.abc import Callable
 
 import pytest
@@ -164,25 +166,64 @@ def test_what_is_unknown_is_shown_while_the_run_still_waits(session: Session) ->
     assert not status.live
 
 
-def test_the_alarm_of_a_real_rig_outlives_the_program(session: Session) -> None:
-    session.set_address("daqmx:Dev1")
-    first = HighVoltageStatus(session)
-    first.run_begins()
-    # the program has died in the run
-    again = Session(session.folder, session.settings, address="daqmx:Dev1")
-    status = HighVoltageStatus(again)
-    assert status.state is HighVoltage.UNKNOWN
+#: Another window, which is killed in a run on a card.
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+from dearig.window.high_voltage.status import HighVoltageStatus
+from dearig.window.session.state import Session
+application = QApplication([])
+settings = QSettings(sys.argv[1], QSettings.Format.IniFormat)
+sessions = [Session(Path(), settings, address=address) for address in sys.argv[2:]]
+statuses = [HighVoltageStatus(session) for session in sessions]
+for status in statuses:
+    status.run_begins()
+print("playing", flush=True)
+sys.stdin.read(1)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_window_that_was_killed_in_a_run_is_told_at_the_next_start(session: Session) -> None:
+    settings = session.settings
+    settings.sync()
+    killed = subprocess.Popen(
+        [sys.executable, "-c", KILLED, settings.fileName(), "daqmx:Dev1", "daqmx:Dev2"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert killed.stdout is not None
+    assert killed.stdout.readline().strip() == "playing"
+    settings.sync()
+    # while it plays, nothing has ended
+    assert HighVoltageStatus(session).alarm is None
+    killed.communicate("k")
+    # on the simulated rig that a start begins with, before any card is chosen
+    status = HighVoltageStatus(session)
     assert status.alarm is not None
-    assert "ended during what was started" in status.alarm.headline
-    assert again.blocks
+    assert status.alarm.text.startswith(
+        "The program ended during what was started on daqmx:Dev1 at "
+    )
+    assert status.state is HighVoltage.NOT_CONTACTED  # of the simulated rig
+    assert session.blocks
+    session.set_address("daqmx:Dev1")
+    assert status.state is HighVoltage.UNKNOWN
     status.acknowledge("Ada")
-    assert not again.blocks
-    third = Session(session.folder, session.settings, address="daqmx:Dev1")
-    assert HighVoltageStatus(third).alarm is None
-    # a run that ends well leaves nothing
-    first.run_begins()
-    first.run_ended(None)
-    assert HighVoltageStatus(third).alarm is None
+    assert status.alarm is not None  # that of the other card
+    assert "on daqmx:Dev2" in status.alarm.text
+    status.acknowledge("Ada")
+    assert not session.blocks
+    again = Session(session.folder, settings, address="daqmx:Dev1")
+    assert HighVoltageStatus(again).alarm is None
+
+
+def test_a_run_on_a_card_that_ends_well_leaves_nothing(session: Session) -> None:
+    session.set_address("daqmx:Dev1")
+    status = HighVoltageStatus(session)
+    status.run_begins()
+    status.run_ended(None)
+    assert HighVoltageStatus(session).alarm is None
 
 
 def test_an_alarm_is_not_released_without_a_name(session: Session) -> None:
