@@ -32,6 +32,7 @@ __all__ = ["HighVoltageBar", "label_stop", "stop_button"]
 _STOP = "⬣  STOP"
 _STOP_AGAIN = "⬣  0 V NOW"
 _HEIGHT = 44  # px
+_NOTICES = 28  # px of the line below it, for the alarm and the notices
 _WORDS = 200  # px of the sentence on the state, in two or three lines
 
 
@@ -113,21 +114,29 @@ class HighVoltageBar(QFrame):
         row.addWidget(self.time)
         row.addWidget(self.detail, 1)
         row.addWidget(self.stop_button)
-        latched = QHBoxLayout()
-        latched.setSpacing(SPACE)
-        latched.addWidget(self.alarm, 1)
-        latched.addWidget(self.acknowledge_button)
+        # of one height, whether it shows something or not: what comes and goes must not move STOP
+        notices = QWidget()
+        notices.setFixedHeight(_NOTICES)
+        self._notices = QHBoxLayout(notices)
+        self._notices.setContentsMargins(0, 0, 0, 0)
+        self._notices.setSpacing(SPACE)
+        self._notices.addWidget(self.alarm, 1)
+        self._notices.addWidget(self.acknowledge_button)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(SPACE, SPACE // 2, SPACE, SPACE // 2)
         rows.setSpacing(SPACE // 2)
         rows.addLayout(row)
-        rows.addLayout(latched)
+        rows.addWidget(notices)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.badge.painted.connect(status.painted)
         self.stop_button.pressed.connect(self.stop_pressed)
         self.acknowledge_button.clicked.connect(self._ask_name)
         status.changed.connect(self._refresh)
         self._refresh()
+
+    def add_notices(self, notices: QWidget) -> None:
+        """Put ``notices`` into the line of the alarm, behind it."""
+        self._notices.addWidget(notices, 1)
 
     def acknowledge(self, name: str) -> None:
         """Release the alarm in the ``name`` of a person, in the log and in the recording."""
@@ -146,7 +155,7 @@ class HighVoltageBar(QFrame):
     @Slot()
     def _refresh(self) -> None:
         status = self._status
-        self.badge.show_state(status.state, status.detail)
+        self.badge.show_state(status.state, status.brief)
         self.detail.setText(status.words)
         self.detail.setToolTip(plain_tip(status.words))
         label_stop(self.stop_button, status.state)

@@ -176,6 +176,17 @@ class HighVoltageStatus(QObject):
             return f"{kilovolts(self.reading.monitor)}  {self.words}".rstrip()
         return self.words
 
+    @property
+    def brief(self) -> str:
+        """What fits below the state: the voltage and its moment, or the time to start."""
+        if self._state is HighVoltage.ARMED:
+            return f"no voltage yet; disarms in {self.seconds_to_start} s"
+        volts, belongs_to = self.number
+        if math.isnan(volts):
+            return self.words
+        moment = belongs_to.replace("\n", " ").replace("monitor at", "at")
+        return kilovolts(volts) if self.live else f"{kilovolts(volts)} {moment}"
+
     # what the runner reports
 
     def set_phase(self, phase: HighVoltage | None) -> None:

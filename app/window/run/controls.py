@@ -129,9 +129,10 @@ class RunControls(QWidget):
         self.rig = ElidedLabel()  # that is in force
         set_role(self.rig, "muted")
         column.addWidget(self.rig)
+        column.addWidget(self.stop_button)
+        # below STOP: texts of any length must not move it
         self.blocked = Message()  # why the rig cannot be armed
         column.addWidget(self.blocked)
-        column.addWidget(self.stop_button)
         for widget in (self.time_left, self.segment, self.progress):
             column.addWidget(widget)
         column.addWidget(card(self._readouts()))
@@ -146,7 +147,7 @@ class RunControls(QWidget):
     def _refresh(self) -> None:
         """Show the high voltage, and whether the readouts are those of this moment."""
         status = self._status
-        self.badge.show_state(status.state, status.detail)
+        self.badge.show_state(status.state, status.brief)
         label_stop(self.stop_button, status.state)
         if self._numbers_of != status.run_number:
             self._clear()

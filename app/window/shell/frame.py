@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Slot
-from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QKeySequence, QShowEvent
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QGuiApplication,
+    QKeySequence,
+    QMoveEvent,
+    QShowEvent,
+)
 from PySide6.QtWidgets import (
     QApplication,
     QFrame,
@@ -17,6 +24,7 @@ from PySide6.QtWidgets import (
     QMessageBox,
     QScrollArea,
     QStackedWidget,
+    QStyle,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -51,6 +59,7 @@ from dearig.window.shell.pages import PAGES
 __all__ = ["MainWindow"]
 
 _COLOUR_SCHEMES = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
+_SETTLING = 1000  # ms after the window is shown in which a window manager gives it its frame
 P = TypeVar("P", bound=Page)
 
 
@@ -75,7 +84,7 @@ class MainWindow(QMainWindow):
         self.stop_keys = StopKeys(self._stop_by_key, lambda: session.busy, self)
         self._build()
         self._guide: Guide | None = None
-        self._closing = False
+        self._closing = self._settling = False
         self._by_signal = False  # closed by a signal: nobody is there to be asked
         self._connect()
         self._apply_colour_scheme()
@@ -151,8 +160,20 @@ class MainWindow(QMainWindow):
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Fit the window, with its frame, into the screen: the bar with STOP must be visible."""
         super().showEvent(event)
-        # the frame of the window manager is known only after the window is shown
+        self._settling = True
         QTimer.singleShot(0, self._fit_screen)
+        # a window manager adds its frame, and moves the window for it, soon after that
+        QTimer.singleShot(_SETTLING, self._settled)
+
+    def moveEvent(self, event: QMoveEvent) -> None:  # noqa: N802
+        super().moveEvent(event)
+        if self._settling:
+            QTimer.singleShot(0, self._fit_screen)
+
+    @Slot()
+    def _settled(self) -> None:
+        self._fit_screen()
+        self._settling = False
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Ask during a run, and make the rig safe whatever the answer."""
@@ -229,7 +250,7 @@ class MainWindow(QMainWindow):
         self.list.setObjectName("pages")
         self.list.setFixedWidth(132)
         self.list.setAccessibleName("Pages")
-        self.stack = QStackedWidget()
+        self.stack = _Stack()
         for place, kind in enumerate(PAGES):
             shortcut = f"Ctrl+{place + 1}"
             self.list.addItem(kind.title)
@@ -259,12 +280,12 @@ class MainWindow(QMainWindow):
         self._top.setContentsMargins(0, 0, 0, 0)
         self._top.setSpacing(SPACE // 2)
         self.bar = HighVoltageBar(self.run_page.runner.status, self.session)
+        self.bar.add_notices(self.banners)
         self._top.addWidget(self.bar)
-        self._top.addWidget(self.banners)
-        self._top.addWidget(CompilationBar(self.compilation))
+        self._top.addLayout(row, 1)
+        # below the pages: what comes and goes must not move them
         self.error_panel = ErrorPanel(self.session.program_errors)
         self._top.addWidget(self.error_panel)
-        self._top.addLayout(row, 1)
         middle = QWidget()
         middle.setLayout(self._top)
         self.setCentralWidget(middle)
@@ -272,6 +293,7 @@ class MainWindow(QMainWindow):
         bar.setSizeGripEnabled(False)
         self.status = label("")
         bar.addWidget(self.status, 1)
+        bar.addPermanentWidget(CompilationBar(self.compilation))
         self.rig_and_folder = label("", "muted")
         bar.addPermanentWidget(self.rig_and_folder)
 
@@ -403,7 +425,9 @@ class MainWindow(QMainWindow):
 
     def _default_geometry(self) -> None:
         available = QGuiApplication.primaryScreen().availableSize()
-        self.resize(available.boundedTo(QSize(1600, 980)))
+        # the frame, which is not known yet, has a title of some such height
+        title = self.style().pixelMetric(QStyle.PixelMetric.PM_TitleBarHeight)
+        self.resize((available - QSize(0, title)).boundedTo(QSize(1600, 980)))
 
     @Slot()
     def _fit_screen(self) -> None:
@@ -420,6 +444,14 @@ class MainWindow(QMainWindow):
         top = max(available.top(), min(frame.top(), available.bottom() + 1 - frame.height()))
         if (left, top) != (frame.left(), frame.top()):
             self.move(QPoint(left, top))
+
+
+class _Stack(QStackedWidget):
+    """Pages of which each needs no more room than it has itself."""
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        shown = self.currentWidget()
+        return super().minimumSizeHint() if shown is None else shown.minimumSizeHint()
 
 
 def _scrollable(pages: QWidget) -> QScrollArea:
