@@ -52,7 +52,7 @@ TEXT_MAX = 2**27
 
 #: A plan that the rig of the thesis can play.
 EXAMPLE = """\
-# A campaign: many runs, one after the other, without a person beside them. Edit it, then
+# A campaign: many runs, one after the other, without a person beside them.
 #   dearig campaign FILE.toml --rig sim --out DIR --check    (says how long it takes; plays nothing)
 #   dearig campaign FILE.toml --rig sim --out DIR
 name = "ageing"

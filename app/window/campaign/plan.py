@@ -112,7 +112,8 @@ def open_campaign(folder: Path) -> OpenedCampaign:
     outcome = seen(folder)
     if outcome.status in ("running", "paused"):
         raise InputError(
-            f"the campaign in {folder} is played by another process; dearig watch {folder} shows it"
+            f"the campaign in {folder} is played by another program; it can be continued here once "
+            f"that has ended"
         )
     queue = outcome.queue
     toml = read_text(folder / "plan.toml", "plan")
