@@ -8,8 +8,10 @@ from dataclasses import dataclass
 __all__ = [
     "BUDGET",
     "COMPLETE",
+    "CONFIRMING",
     "EXPLAINED",
     "NOTHING_MISSING",
+    "NOT_CONFIRMED",
     "PARTLY_EXPLAINED",
     "STOPPED",
     "TOLERANCE",
@@ -21,6 +23,7 @@ __all__ = [
 NOTHING_MISSING = "nothing_missing"
 EXPLAINED = "explained"
 PARTLY_EXPLAINED = "partly_explained"
+NOT_CONFIRMED = "not_confirmed"
 UNEXPLAINED = "unexplained"
 
 #: How the search ended: by itself, stopped by the operator, or at its computing budget.
@@ -32,6 +35,10 @@ BUDGET = "budget"
 #: per cent, and the fitted parameters add their own error to a prediction.
 TOLERANCE = 1.15
 
+#: Twice the logarithm of the odds, e^5, by which validation recordings have to be more probable
+#: with the effects that were found than without them: as much as tells two explanations apart.
+CONFIRMING = 10.0
+
 
 @dataclass(frozen=True)
 class Judgement:
@@ -40,8 +47,9 @@ class Judgement:
     ``reasons`` are of: ``training`` (the error of a training recording is above its noise),
     ``selection`` (the cross-validation error rises with what was added), ``validation`` (the error
     of a validation recording is above its noise), ``rest`` (nothing was found, but the readings at
-    rest move slowly, and count as noise) and ``stopped`` (nothing is missing so far, but not
-    everything was tried).
+    rest move slowly, and count as noise), ``stopped`` (nothing is missing so far, but not
+    everything was tried) and ``prediction`` (validation recordings above their noise are not
+    predicted better with what was found than without it).
     """
 
     verdict: str
@@ -55,6 +63,7 @@ def judge(
     validation: Sequence[float],
     selection: tuple[float, float],
     moves_at_rest: bool = False,
+    gain: float | None = None,
 ) -> Judgement:
     """Return the verdict that the numbers support, which is never more than ``found``.
 
@@ -63,15 +72,20 @@ def judge(
     final model, one for each recording, without the recording's own drift and events where these
     are known; infinite where the model cannot follow the recording. ``selection`` is the
     cross-validation error over the noise, with the baseline and with the final model. With
-    ``moves_at_rest`` the noise at rest of a training recording is mostly slow motion.
+    ``moves_at_rest`` the noise at rest of a training recording is mostly slow motion. ``gain`` is
+    twice the logarithm of how much more probable the validation recordings are with the effects
+    that were found, None where none was found or nothing validates it.
     """
+    beyond = any(error > TOLERANCE for error in validation)
+    if found in (EXPLAINED, PARTLY_EXPLAINED) and gain is not None and gain < CONFIRMING and beyond:
+        return Judgement(NOT_CONFIRMED, ("prediction",))
     if found not in (NOTHING_MISSING, EXPLAINED):
         return Judgement(found)
     before, after = selection
     doubts = {
         "training": any(error > TOLERANCE for error in training),
         "selection": found == EXPLAINED and after > before and after > TOLERANCE,
-        "validation": any(error > TOLERANCE for error in validation),
+        "validation": beyond,
         "rest": found == NOTHING_MISSING and moves_at_rest,
         "stopped": found == NOTHING_MISSING and status == STOPPED,
     }

@@ -22,7 +22,7 @@ from dearig.sim_backend.keyence import SimulatedController
 from dearig.sim_backend.serial_port import serve_on_pty, serve_on_socket
 
 if TYPE_CHECKING:
-    from dearig.sim_backend.daqmx.card.device import Device
+    from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 
 __all__ = ["Serving", "TlsFiles", "needs_simulated_card", "serve"]
 
@@ -155,7 +155,7 @@ def _signals(texts: Sequence[str] | None) -> dict[str, str] | None:
 
 
 def _controller(
-    rig_file: RigFile, device: Device, faults: FaultPlan
+    rig_file: RigFile, device: SimulatedCard, faults: FaultPlan
 ) -> AbstractContextManager[str]:
     """Return a laser controller at a serial port, set as in the rig file, that reads the film."""
     controller = SimulatedController(rig_file.laser, lambda _: device.displacement(), faults=faults)

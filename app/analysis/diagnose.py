@@ -21,6 +21,7 @@ from dearig.analysis.outcomes import (
     covariance_table,
     pooled_rms,
 )
+from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import (
     assumed_by,
     base_model,
@@ -28,18 +29,10 @@ from dearig.analysis.readings.compatibility import (
     check_branches,
     of_rig,
 )
-from dearig.analysis.readings.early_ends import choose
-from dearig.analysis.readings.quality import check_enough, extrapolated, few_data, inspect
-from dearig.analysis.readings.record import (
-    Source,
-    air_texts_of,
-    as_record,
-    check_named_once,
-    compare,
-    noise_texts,
-    open_all,
-    room_texts,
-)
+from dearig.analysis.readings.enough import check_enough, extrapolated, few_data
+from dearig.analysis.readings.opening import Source, check_named_once
+from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
+from dearig.analysis.readings.room import air_texts_of, room_texts
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence, parse_sequence
@@ -56,7 +49,7 @@ from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
-from dearig.model.fitting.prediction import prediction_error
+from dearig.model.fitting.prediction import prediction_error, prediction_gain
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.verdict import NOTHING_MISSING
@@ -101,12 +94,12 @@ def diagnose_recordings(
     started = clock()
     check_named_once(train, validation)
     settings = _Settings(branches, spring, branch_spring, drive, rig_file, thorough, ended_early)
-    recordings, left_out = choose(open_all(train), ended_early)
-    others, also_left_out = choose(open_all(validation), ended_early)
-    base, quality = _prepared(recordings, others, settings)
-    finding = _search(recordings, others, base, settings, progress)
+    fitted, left_out = settings.read(train)
+    others, also_left_out = settings.read(validation)
+    base, quality = _prepared(fitted, others, settings)
+    finding = _search(fitted, others, base, settings, progress)
     said = (*left_out, *also_left_out, *quality)
-    return _outcome(recordings, others, finding, said, settings, "", started, clock)
+    return _outcome(fitted, others, finding, said, settings, "", started, clock)
 
 
 def diagnose_rig(
@@ -156,23 +149,21 @@ def diagnose_rig(
     if not files:
         recorder.run("thesis")
         files += recorder.made
-    recordings, finding, performed, ended = _search_and_separate(
-        files, experiments, settings, recorder
-    )
-    others: list[Recording] = []
+    fitted, finding, performed, ended = _search_and_separate(files, experiments, settings, recorder)
+    others: list[Readings] = []
     if validation:
-        others, _ = choose(open_all(validation), settings.ended_early)
+        others, _ = settings.read(validation)
     elif not (ended or finding.interrupted):
         recorded = len(recorder.made)
         ended = recorder.run_until_ended(*VALIDATION)
-        others = open_all(recorder.made[recorded:])
+        others, _ = read_all(recorder.made[recorded:], settings.drive)
     if ended is not None:
         stopped = finding.interrupted or isinstance(ended, Interrupted)
         notes = (*finding.notes, f"Recording ended before all runs were made: {ended}")
         finding = replace(finding, interrupted=stopped, notes=notes)
-    _, quality = _prepared(recordings, others, settings)
+    _, quality = _prepared(fitted, others, settings)
     outcome = _outcome(
-        recordings, others, finding, quality, settings, address, started, clock, performed
+        fitted, others, finding, quality, settings, address, started, clock, performed
     )
     return replace(outcome, ended=ended)
 
@@ -193,6 +184,10 @@ class _Settings:
     def rig(self) -> RigFile:
         """The rig file, or the thesis's rig."""
         return self.rig_file or RigFile()
+
+    def read(self, sources: Sequence[Source | Readings]) -> tuple[list[Readings], list[str]]:
+        """Return the readings of ``sources`` to use, and a sentence on each that is left out."""
+        return read_all(sources, self.drive, self.ended_early)
 
 
 # ---------------------------------------------------------------- on a rig
@@ -267,30 +262,29 @@ def _experiment_name(index: int) -> str:
 
 
 def _search_and_separate(
-    files: list[Source], experiments: int, settings: _Settings, recorder: _Recorder
-) -> tuple[list[Recording], Diagnosis, list[str], DearigError | None]:
+    files: Sequence[Source], experiments: int, settings: _Settings, recorder: _Recorder
+) -> tuple[list[Readings], Diagnosis, list[str], DearigError | None]:
     """Search, and while rivals are left, record a separating experiment and search again.
 
-    Returns the recordings of the last search, its result, a sentence on each experiment, and the
+    Returns the readings of the last search, its result, a sentence on each experiment, and the
     error that ended an experiment early.
     """
-    files = [*files]
+    readings, _ = settings.read(files)
     performed: list[str] = []
     while True:
-        recordings, _ = choose(open_all(files), settings.ended_early)
-        base, _ = _prepared(recordings, [], settings)
-        finding = _search(recordings, [], base, settings, recorder.parts.part(2.0))
+        base, _ = _prepared(readings, [], settings)
+        finding = _search(readings, [], base, settings, recorder.parts.part(2.0))
         if finding.interrupted or len(performed) >= experiments:
-            return recordings, finding, performed, None
-        noise = _noise(recordings, settings.drive)
+            return readings, finding, performed, None
+        noise = _noise(readings)
         experiment, words = _experiment(finding, noise, settings.rig)
         if experiment is None:
-            return recordings, finding, performed, None
+            return readings, finding, performed, None
         name = _experiment_name(len(performed))
         ended = recorder.run_until_ended(name, sequence=experiment.sequence)
         if ended is not None:
-            return recordings, finding, performed, ended
-        files.append(recorder.made[-1])
+            return readings, finding, performed, ended
+        readings, _ = settings.read([*readings, recorder.made[-1]])
         performed.append(f"{words}. It was run, and its recording, {name}.h5, was added.")
 
 
@@ -298,28 +292,27 @@ def _search_and_separate(
 
 
 def _prepared(
-    recordings: Sequence[Recording], others: Sequence[Recording], settings: _Settings
+    fitted: Sequence[Readings], others: Sequence[Readings], settings: _Settings
 ) -> tuple[Any, tuple[str, ...]]:
-    """Return the baseline to fit, and sentences on the recordings. Raises ``InputError``."""
+    """Return the baseline to fit, and sentences on the readings. Raises ``InputError``."""
     check_branches(settings.branches)
-    check_apart(recordings, others)
+    recordings, every = recordings_of(fitted), (*fitted, *others)
+    check_apart(recordings, recordings_of(others))
     base = base_model(
         recordings, settings.branches, settings.spring, None, settings.rig_file,
         settings.branch_spring,
     )  # fmt: skip
-    said = [
-        f"{r.name}: {sentence}"
-        for r in (*recordings, *others)
-        for sentence in inspect(r, settings.drive, to_fit=r in recordings).findings
-    ]
-    said += noise_texts((*recordings, *others))
-    said += room_texts((*recordings, *others))
+    for readings in fitted:
+        readings.check_driven()
+    said = [f"{each.name}: {sentence}" for each in every for sentence in each.quality.findings]
+    said += noise_texts(every)
+    said += room_texts(recordings_of(every))
     said += air_texts_of(recordings)
-    said += extrapolated(recordings, others, settings.drive)
-    films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
+    said += extrapolated(fitted, others)
+    films = sorted({r.film_id for r in recordings_of(every) if r.film_id})
     if len(films) > 1:
         said.append(f"the recordings name different films: {', '.join(films)}")
-    check_enough(recordings, settings.drive)
+    check_enough(fitted)
     return base, tuple(said)
 
 
@@ -328,13 +321,13 @@ def _prepared(
 
 @for_simulations()
 def _search(
-    recordings: Sequence[Recording],
-    others: Sequence[Recording],
+    fitted: Sequence[Readings],
+    others: Sequence[Readings],
     base: Any,
     settings: _Settings,
     progress: Progress,
 ) -> Diagnosis:
-    records, rest = ([as_record(r, settings.drive) for r in some] for some in (recordings, others))
+    records, rest = ([each.record for each in some] for some in (fitted, others))
     try:
         with Interrupts() as interrupts:
             return diagnose(
@@ -350,8 +343,8 @@ def _search(
 
 
 def _outcome(
-    recordings: Sequence[Recording],
-    others: Sequence[Recording],
+    fitted: Sequence[Readings],
+    others: Sequence[Readings],
     finding: Diagnosis,
     quality: tuple[str, ...],
     settings: _Settings,
@@ -361,9 +354,7 @@ def _outcome(
     performed: Sequence[str] = (),
 ) -> DiagnoseOutcome:
     if finding.held:
-        recordings = [replace(r, hold=True) for r in recordings]
-        others = [replace(r, hold=True) for r in others]
-    drive = settings.drive
+        fitted, others = ([each.held() for each in some] for some in (fitted, others))
     failed: list[str] = []
     models = [finding.baseline, *(s.stage for s in finding.steps[:-1]), finding.final]
     if not finding.steps:
@@ -371,8 +362,8 @@ def _outcome(
     stands = tuple(
         Evaluation(
             tuple(name for name, _ in stage.model.effects),
-            _compared(recordings, stage.of_each(len(recordings)), "train", drive, failed),
-            _compared(others, [stage.predicting] * len(others), "validation", drive, failed),
+            _compared(fitted, stage.of_each(len(fitted)), "train", failed),
+            _compared(others, [stage.predicting] * len(others), "validation", failed),
         )
         for stage in models
     )
@@ -380,20 +371,21 @@ def _outcome(
     # that the reading drifts is for the training recordings to show: alone in another one, what is
     # slow may be a law that they do not show
     drifts = any(step.family == "drift" for step in finding.steps)
-    own = _own((*recordings, *others), found, drive, drifts)
+    own = _own((*fitted, *others), found, drifts)
     stands = tuple(
         _without_own(stand, own) if stage.predicting == found else stand
         for stand, stage in zip(stands, models, strict=True)
     )
-    noise = _noise(recordings, drive)
+    noise = _noise(fitted)
     experiment, words = (
         None,
         "No experiment is proposed: the recordings are of films, which no voltage sequence drives.",
     )
-    if recordings[0].kind == "actuator":
+    if fitted[0].kind == "actuator":
         experiment, words = _experiment(finding, noise, settings.rig)
     seconds = clock() - started
     said = (*quality, *dict.fromkeys(failed))
+    recordings = recordings_of(fitted)
     title = _title(recordings)
     effects = ", ".join(name for name, _ in finding.final.predicting.effects)
     name = f"{title}, with {effects}" if effects else f"{title}, nothing added"
@@ -401,7 +393,7 @@ def _outcome(
     outcome = DiagnoseOutcome(
         title=title,
         kind=recordings[0].kind,
-        drive=drive,
+        drive=settings.drive,
         model=ModelFile(name, finding.final.predicting),
         finding=finding,
         stands=stands,
@@ -412,22 +404,22 @@ def _outcome(
         seconds=seconds,
         performed=tuple(performed),
         rig=rig,
-        few_data=few_data(recordings, drive),
+        few_data=few_data(fitted),
         assumed=assumed_by(recordings, settings.rig_file),
         not_compared=tuple(r.name for r in others if r.name not in compared),
-        prediction_errors=_prediction_errors(
-            [r for r in others if r.name in compared], finding, drive
-        ),
+        prediction_errors=_prediction_errors([r for r in others if r.name in compared], finding),
+        gain=_gain(stands, own, noise) if finding.steps else None,
     )
+    if not outcome.recommends_final:
+        plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)
+        outcome = replace(outcome, model=plain)
     history = _history(outcome, recordings)
     return replace(outcome, model=replace(outcome.model, history=history))
 
 
 @for_simulations()
-def _prediction_errors(
-    recordings: Sequence[Recording], finding: Diagnosis, drive: str
-) -> tuple[float, ...]:
-    """Return what the parameters' own error may make of each recording, in m or Pa.
+def _prediction_errors(readings: Sequence[Readings], finding: Diagnosis) -> tuple[float, ...]:
+    """Return what the parameters' own error may make of each of ``readings``, in m or Pa.
 
     () where an effect was found, or the parameters have no covariance: it is not asked for.
     """
@@ -435,10 +427,8 @@ def _prediction_errors(
     if finding.verdict != NOTHING_MISSING or not final.covariance_names:
         return ()
     return tuple(
-        prediction_error(
-            as_record(r, drive), final.predicting, final.covariance_names, final.covariance
-        )
-        for r in recordings
+        prediction_error(each.record, final.predicting, final.covariance_names, final.covariance)
+        for each in readings
     )
 
 
@@ -448,23 +438,21 @@ def _title(recordings: Sequence[Recording]) -> str:
 
 
 def _compared(
-    recordings: Sequence[Recording], models: Sequence[Any], role: str, drive: str, failed: list[str]
+    readings: Sequence[Readings], models: Sequence[Any], role: str, failed: list[str]
 ) -> tuple[Comparison, ...]:
     found = []
-    for recording, model in zip(recordings, models, strict=True):
+    for each, model in zip(readings, models, strict=True):
         try:
-            found.append(compare(recording, model, role, drive))
+            found.append(compare(each, model, role))
         except InputError as error:
             # a long search must not be lost because a model cannot follow one drive
-            failed.append(f"{recording.name} is left out of the {role} errors: {error}")
+            failed.append(f"{each.name} is left out of the {role} errors: {error}")
     return tuple(found)
 
 
-def _own(
-    recordings: Sequence[Recording], model: Any, drive: str, may_drift: bool
-) -> dict[str, Own | None]:
-    """Return the events and the drift of each of ``recordings``; None without any, and of films."""
-    records = {r.name: as_record(r, drive) for r in recordings}
+def _own(readings: Sequence[Readings], model: Any, may_drift: bool) -> dict[str, Own | None]:
+    """Return the events and the drift of each of ``readings``; None without any, and of films."""
+    records = {each.name: each.record for each in readings}
     rigs = [r for r in records.values() if isinstance(r, ActuatorRecord)]
     # of all recordings together: what is slow in each, and begins with its voltage, is a law
     may_drift = may_drift and isinstance(model, Actuator) and drifts_at_rest(rigs, model)
@@ -495,9 +483,32 @@ def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
     )
 
 
-def _noise(recordings: Sequence[Recording], drive: str) -> float:
+def _gain(stands: Sequence[Evaluation], own: dict[str, Own | None], noise: float) -> float | None:
+    """Return twice the log of the odds that validation gives to the final model, over the first.
+
+    None where nothing validates it, minus infinity where it cannot follow what the first one can.
+    """
+    last = {c.name: c for c in stands[-1].validation}
+    first = stands[0].validation
+    if any(c.name not in last for c in first):
+        return -math.inf
+    gains = []
+    for one in first:
+        two, found = last[one.name], own.get(one.name)
+        alone = found.signal if found is not None and found.signal.size == one.time.size else 0.0
+        gains.append(
+            prediction_gain(
+                one.measured - one.model - alone,
+                two.measured - two.model - alone,
+                one.noise or noise,
+            )
+        )
+    return sum(gains) if gains else None
+
+
+def _noise(readings: Sequence[Readings]) -> float:
     """Return the noise of the training recordings, RMS over all samples, m or Pa."""
-    records = [as_record(r, drive) for r in recordings]
+    records = [each.record for each in readings]
     samples = sum(r.measured.size for r in records)
     return math.sqrt(sum(r.noise**2 * r.measured.size for r in records) / samples)
 
@@ -523,6 +534,7 @@ def _experiment(
 def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[str, Any]:
     """Return the origin of the model, for its file."""
     finding, stands = outcome.finding, outcome.stands
+    stage = finding.final if outcome.recommends_final else finding.baseline
     shown = SHOWN[outcome.kind]
 
     def rms(comparisons: Sequence[Comparison]) -> float | None:
@@ -542,7 +554,8 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
         "verdict": outcome.verdict,
         "status": outcome.status,
         "interrupted": finding.interrupted,
-        "mean_square_over_noise": finding.final.cost,
+        "recommended": "final" if outcome.recommends_final else "baseline",
+        "mean_square_over_noise": stage.cost,
         f"noise_floor_{shown.suffix}": outcome.noise * shown.error_factor,
         "notes": [*finding.notes, *outcome.quality],
         "before": errors(stands[0]),
@@ -557,7 +570,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
                 "indistinguishable_from": list(s.indistinguishable_from),
                 "evidence": list(s.evidence),
             }
-            for s in finding.steps
+            for s in (finding.steps if outcome.recommends_final else ())
         ],
         "estimate": [
             {
@@ -570,7 +583,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
                 "at_bound": e.at_bound,
                 "note": e.note,
             }
-            for e in finding.final.estimates
+            for e in stage.estimates
         ],
-        "covariance": covariance_table(finding.final.covariance_names, finding.final.covariance),
+        "covariance": covariance_table(stage.covariance_names, stage.covariance),
     }

@@ -21,24 +21,18 @@ from dearig.analysis.outcomes import (
     covariance_table,
     pooled_over_noise,
 )
+from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import (
     assumed_by,
     base_model,
     check_apart,
     check_branches,
 )
-from dearig.analysis.readings.early_ends import choose
-from dearig.analysis.readings.quality import few_data
-from dearig.analysis.readings.record import (
-    PUBLISHED_FIT,
-    Source,
-    as_record,
-    check_named_once,
-    compare,
-    noise_texts,
-    open_all,
-    room_texts,
-)
+from dearig.analysis.readings.enough import few_data
+from dearig.analysis.readings.opening import Source, check_named_once
+from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
+from dearig.analysis.readings.room import room_texts
+from dearig.analysis.thesis_runs import PUBLISHED_FIT
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
@@ -93,10 +87,11 @@ def identify_recordings(
     check_named_once(train, validation)
     started = clock()
     given = given_values(rig_file, drive)
-    recordings, left_out = choose(open_all(train), ended_early)
-    others, also_left_out = choose(open_all(validation), ended_early)
-    check_apart(recordings, others)
-    records = [as_record(r, drive) for r in recordings]
+    fitted, left_out = read_all(train, drive, ended_early)
+    others, also_left_out = read_all(validation, drive, ended_early)
+    recordings = recordings_of(fitted)
+    check_apart(recordings, recordings_of(others))
+    records = [each.record for each in fitted]
     for count in branches:
         check_branches(count, least=0 if recordings[0].kind == "film" else 1)
     counts = sorted(set(branches))
@@ -111,9 +106,7 @@ def identify_recordings(
     springs: tuple[SpringCandidate, ...] = ()
     start: Network | None = None
     if spring == CHOOSE:
-        springs, start = _spring_candidates(
-            records, recordings, others, base_of, counts, drive, progress
-        )
+        springs, start = _spring_candidates(records, fitted, others, base_of, counts, progress)
         spring, counts = springs[0].spring, [springs[0].branches]
     alone = len(counts) == 1
 
@@ -129,14 +122,14 @@ def identify_recordings(
     trials: list[BranchTrial] = []
     if not alone:
         trials = [
-            _trial(n, candidate, recordings, others, drive, score, chosen=n == count)
+            _trial(n, candidate, fitted, others, score, chosen=n == count)
             for n, candidate, score in zip(counts, fits, scores, strict=True)
         ]
         if intervals and method == "hybrid":
             fit = add_intervals(records, fit, progress=progress)
     fit = with_budget(records, fit, given, progress=progress)
-    compared = [compare(r, fit.model, "train", drive) for r in recordings]
-    validated = [compare(r, fit.model, "validation", drive) for r in others]
+    compared = [compare(r, fit.model, "train") for r in fitted]
+    validated = [compare(r, fit.model, "validation") for r in others]
     seconds = clock() - started
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
@@ -157,10 +150,10 @@ def identify_recordings(
         quality=(
             *left_out,
             *also_left_out,
-            *noise_texts((*recordings, *others)),
-            *room_texts((*recordings, *others)),
+            *noise_texts((*fitted, *others)),
+            *room_texts(recordings_of((*fitted, *others))),
         ),
-        few_data=few_data(recordings, drive),
+        few_data=few_data(fitted),
         assumed=assumed_by(recordings, rig_file),
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
     )
@@ -168,11 +161,10 @@ def identify_recordings(
 
 def _spring_candidates(
     records: Sequence[Record],
-    train: Sequence[Recording],
-    others: Sequence[Recording],
+    train: Sequence[Readings],
+    others: Sequence[Readings],
     base_of: Callable[[int, str], Any],
     counts: Sequence[int],
-    drive: str,
     progress: Progress,
 ) -> tuple[tuple[SpringCandidate, ...], Network]:
     """Return every strain energy with every number of branches, the most probable first.
@@ -188,8 +180,8 @@ def _spring_candidates(
     found: list[SpringCandidate] = []
     ranked = sorted(trials, key=lambda t: t.criterion)
     for trial in ranked:
-        checked = [compare(r, trial.model, "validation", drive) for r in others]
-        fitted = [compare(r, trial.model, "train", drive) for r in train]
+        checked = [compare(r, trial.model, "validation") for r in others]
+        fitted = [compare(r, trial.model, "train") for r in train]
         found.append(
             SpringCandidate(
                 spring=trial.kind,
@@ -251,14 +243,13 @@ def _bic(fit: Identification, records: Sequence[Record], correlation: float) -> 
 def _trial(
     count: int,
     fit: Identification,
-    train: Sequence[Recording],
-    validation: Sequence[Recording],
-    drive: str,
+    train: Sequence[Readings],
+    validation: Sequence[Readings],
     bic: float,
     chosen: bool,
 ) -> BranchTrial:
-    fitted = [compare(r, fit.model, "train", drive) for r in train]
-    checked = [compare(r, fit.model, "validation", drive) for r in validation]
+    fitted = [compare(r, fit.model, "train") for r in train]
+    checked = [compare(r, fit.model, "validation") for r in validation]
     return BranchTrial(
         branches=count,
         train_rms=_pooled(fitted),

@@ -13,7 +13,7 @@ import numpy as np
 
 from dearig.errors import DearigError
 from dearig.model.readings.noise import LEAD_IN, slow_at_rest
-from dearig.model.verdict import NOTHING_MISSING, STOPPED, Judgement, judge
+from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, STOPPED, Judgement, judge
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
@@ -255,18 +255,21 @@ class SeparatingExperiment:
 class DiagnoseOutcome:
     """A finished (or interrupted) diagnosis, with its errors on training and validation recordings.
 
-    ``model`` is the final model with its history; ``model_path`` is where it was saved, "" if it
-    was not. ``stands`` are the baseline, the model after each step, and last the final one.
-    ``noise`` is the pooled noise floor of the training recordings in m or Pa. ``experiment``
-    separates explanations that the data do not separate; ``experiment_words`` describes it, or says
-    why there is none. ``performed`` describes the experiments that were run on a rig, one sentence
-    each. ``quality`` are sentences on recordings. ``ended`` is the error that ended the recording
-    on the rig early, None if none did. ``not_compared`` names validation recordings that the final
-    model cannot follow. ``few_data`` says how few data were fitted, "" if there are enough.
-    ``assumed`` says which values of the film and the load no recording has, "" if none.
-    ``prediction_errors`` are, of each validation recording, the part in m or Pa that the errors of
-    the fitted parameters alone may make (95 % bound), () where that is not known. ``seconds`` is
-    the computing time.
+    ``model`` is the model that predicts better, the final one or the baseline, with its history;
+    ``model_path`` is where it was saved, "" if it was not. ``stands`` are the baseline, the model
+    after each step, and last the final one. ``noise`` is the pooled noise floor of the training
+    recordings in m or Pa. ``experiment`` separates explanations that the data do not separate;
+    ``experiment_words`` describes it, or says why there is none. ``performed`` describes the
+    experiments that were run on a rig, one sentence each. ``quality`` are sentences on recordings.
+    ``ended`` is the error that ended the recording on the rig early, None if none did.
+    ``not_compared`` names validation recordings that the final model cannot follow. ``few_data``
+    says how few data were fitted, "" if there are enough. ``assumed`` says which values of the film
+    and the load no recording has, "" if none. ``prediction_errors`` are, of each validation
+    recording, the part in m or Pa that the errors of the fitted parameters alone may make (95 %
+    bound), () where that is not known. ``gain`` is twice the logarithm of the odds that the
+    validation recordings give to what was found, without what happened in one of them alone: None
+    where nothing was found or nothing validates it, minus infinity where the final model cannot
+    follow one of them. ``seconds`` is the computing time.
     """
 
     title: str
@@ -288,6 +291,7 @@ class DiagnoseOutcome:
     few_data: str = ""
     assumed: str = ""
     prediction_errors: tuple[float, ...] = ()
+    gain: float | None = None
 
     @property
     def status(self) -> str:
@@ -297,8 +301,50 @@ class DiagnoseOutcome:
 
     @property
     def verdict(self) -> str:
-        """``nothing_missing``, ``explained``, ``partly_explained`` or ``unexplained``."""
+        """One of the constants of ``dearig.model.verdict``, as of ``judgement``."""
         return self.judgement.verdict
+
+    @property
+    def _comparable(self) -> tuple[tuple[Comparison, Comparison], ...]:
+        """Validation recordings with the baseline and with the final model.
+
+        () where the final model cannot follow one that the baseline follows.
+        """
+        last = {c.name: c for c in self.after.validation}
+        if any(c.name not in last for c in self.before.validation):
+            return ()
+        return tuple((c, last[c.name]) for c in self.before.validation)
+
+    @property
+    def recommends_final(self) -> bool:
+        """Whether the final model predicts untouched recordings better than the baseline does.
+
+        True where none was given. The model that predicts better is the one to be written and used.
+        """
+        if not self.finding.steps or not self.before.validation:
+            return True
+        before, after = ([pair[i] for pair in self._comparable] for i in (0, 1))
+        return bool(after) and pooled_rms(after) < pooled_rms(before)
+
+    @property
+    def families(self) -> tuple[tuple[str, float], ...]:
+        """The probabilities of the families, largest first, with what validation says of them.
+
+        Where it does not confirm what was found, the part of the error above the noise that is left
+        on untouched recordings is of no known family.
+        """
+        if self.verdict != NOT_CONFIRMED:
+            return self.finding.families
+        left = 1.0
+        if self.recommends_final:
+            above = [
+                max(pooled_rms(some) ** 2 - (pooled_noise(some) or self.noise) ** 2, 0.0)
+                for some in ([pair[i] for pair in self._comparable] for i in (0, 1))
+            ]
+            left = above[1] / above[0] if above[0] > 0.0 else 1.0
+        found = {family: p * (1.0 - left) for family, p in self.finding.families}
+        found["unknown"] = found.get("unknown", 0.0) + left
+        return tuple(sorted(found.items(), key=lambda item: -item[1]))
 
     @cached_property
     def judgement(self) -> Judgement:
@@ -320,6 +366,7 @@ class DiagnoseOutcome:
             [*untouched, *(math.inf for _ in self.not_compared)],
             (finding.baseline.selection_rms / noise, finding.final.selection_rms / noise),
             any(c.moves_at_rest for c in self.after.train),
+            self.gain,
         )
 
     @property

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.outcomes import Comparison
+from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import base_model, check_branches
-from dearig.analysis.readings.early_ends import choose
-from dearig.analysis.readings.record import Source, as_record, compare, open_all
+from dearig.analysis.readings.opening import Source
+from dearig.analysis.readings.record import read_all, recordings_of
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.fitting import Estimate, fit_shared
@@ -46,14 +47,14 @@ def identify_shared(
     not in the result. Raises ``InputError`` for recordings and names that cannot be fitted.
     """
     check_branches(branches)
-    recordings, _ = choose(open_all(train), ended_early)
-    base = base_model(recordings, branches, spring, None, None)
-    records = [as_record(recording, drive) for recording in recordings]
+    readings, _ = read_all(train, drive, ended_early)
+    base = base_model(recordings_of(readings), branches, spring, None, None)
+    records = [each.record for each in readings]
     try:
         fit = fit_shared(records, base, own, progress=progress)
     except ModelError as error:
         raise InputError(f"these recordings cannot be fitted together: {error}") from error
     return [
-        SharedOutcome(r.path, estimates, compare(r, model, "train", drive), fit.converged)
-        for r, estimates, model in zip(recordings, fit.estimates, fit.models, strict=True)
+        SharedOutcome(r.recording.path, estimates, compare(r, model, "train"), fit.converged)
+        for r, estimates, model in zip(readings, fit.estimates, fit.models, strict=True)
     ]

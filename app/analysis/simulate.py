@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.analysis.readings.record import recording_drive
+from dearig.analysis.readings.record import Readings
 from dearig.config.modelfile import ModelFile, load_model, model_toml
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, load_sequence
@@ -87,7 +87,7 @@ def simulate_model(
             kinematics=drive.kinematics,
             sequence_toml=drive.sequence_toml,
         )
-    driven = recording_drive(drive, voltage)
+    driven = Readings(drive, voltage).voltage
     values, field_max, pull_in = _actuator(given.model, driven)
     return Prediction(
         title=title,

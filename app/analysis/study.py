@@ -20,12 +20,13 @@ from dearig.analysis.outcomes import (
     save_fitted_model,
 )
 from dearig.analysis.readings.compatibility import of_rig
+from dearig.analysis.readings.opening import open_all
 from dearig.analysis.residual import even, spectrum
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.residual import Dependence, MissingStress, Signature
 from dearig.progress import Progress, quiet
-from dearig.recording.reading.reader import open_recording
+from dearig.recording.reading.recording import Recording
 from dearig.recording.result_folder import numbered_folder
 
 __all__ = ["Residual", "Study", "Task", "Trace", "study"]
@@ -111,14 +112,16 @@ def study(
     if not (folder.is_dir() and os.access(folder, os.W_OK)):
         raise InputError(f"{folder} cannot be written to; choose another folder for the results")
     found: IdentifyOutcome | DiagnoseOutcome
+    train = open_all(task.train)
     if task.diagnose:
         found = diagnose_recordings(
-            task.train, validation=task.validation, branches=task.branches, drive=task.drive,
-            rig_file=_rig_of(task), ended_early=task.ended_early, clock=clock, progress=progress,
+            train, validation=task.validation, branches=task.branches, drive=task.drive,
+            rig_file=_rig_of(task.limits, train), ended_early=task.ended_early, clock=clock,
+            progress=progress,
         )  # fmt: skip
     else:
         found = identify_recordings(
-            task.train, validation=task.validation, branches=(task.branches,), spring=task.spring,
+            train, validation=task.validation, branches=(task.branches,), spring=task.spring,
             drive=task.drive, ended_early=task.ended_early, clock=clock, progress=progress,
         )  # fmt: skip
     where = numbered_folder(folder, "study")
@@ -132,15 +135,14 @@ def study(
     return Study(task, found, residuals, model, report)
 
 
-def _rig_of(task: Task) -> RigFile | None:
+def _rig_of(limits: RigFile | None, train: Sequence[Recording]) -> RigFile | None:
     """Return the limits of the rig with the film and load of the recordings, if they name them."""
-    if task.limits is None:
+    if limits is None:
         return None
-    for path in task.train:
-        recording = open_recording(path)
+    for recording in train:
         if recording.film is not None and recording.load is not None:
-            return of_rig(task.limits, recording.film, recording.load)
-    return task.limits
+            return of_rig(limits, recording.film, recording.load)
+    return limits
 
 
 def _diagnosed(outcome: DiagnoseOutcome) -> tuple[Residual, ...]:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.decimate import decimate
-from dearig.analysis.readings.record import compare
+from dearig.analysis.readings.compare import compare
+from dearig.analysis.readings.record import Readings
 from dearig.analysis.spectrum import amplitude_density
 from dearig.config.modelfile import load_model
 from dearig.errors import DearigError, InputError
@@ -20,6 +21,7 @@ from dearig.model.readings.measures import Errors
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 from dearig.progress import Progress, quiet
+from dearig.recording.content.fields import CONDITIONS, TEXTS
 from dearig.recording.exporters import export_recording
 from dearig.recording.reading.index import Entry, glance
 from dearig.recording.reading.reader import open_recording
@@ -72,9 +74,10 @@ class RecordingSummary:
     """Summary of one file of a folder; ``trouble`` says why the file cannot be read.
 
     ``name`` is its path in the folder without the ending. ``started`` is ISO time, ``duration`` in
-    s. ``peaks`` has the largest absolute value of each channel, with its sign, in SI units.
-    ``thumbnail`` are ``(time, signal)`` of a few points, scaled to 0 to 1. ``errors``, ``noise``,
-    ``unfit`` and ``fitted`` are those of the ``Assessment``, once it is there.
+    s. ``texts`` are those of ``content.fields.TEXTS``. ``peaks`` has the largest absolute value of
+    each channel, with its sign, in SI units. ``thumbnail`` are ``(time, signal)`` of a few points,
+    scaled to 0 to 1. ``errors``, ``noise``, ``unfit`` and ``fitted`` are those of the
+    ``Assessment``, once it is there.
     """
 
     path: Path
@@ -82,10 +85,7 @@ class RecordingSummary:
     name: str = ""
     kind: str = ""
     title: str = ""
-    film: str = ""
-    operator: str = ""
-    rig: str = ""
-    notes: str = ""
+    texts: Mapping[str, str] = field(default_factory=dict)
     identifier: str = ""
     started: str = ""
     duration: float = 0.0
@@ -102,6 +102,11 @@ class RecordingSummary:
     noise: float | None = None
     unfit: str = ""
     fitted: bool = False
+
+    @property
+    def film(self) -> str:
+        """The operator's name for the film, "" without one."""
+        return self.texts.get("film_id", "")
 
 
 @dataclass(frozen=True)
@@ -172,10 +177,7 @@ def summary_of(folder: Path, entry: Entry) -> RecordingSummary:
         name=str(PurePosixPath(entry.path).with_suffix("")),
         kind=entry.kind,
         title=entry.title,
-        film=entry.film_id,
-        operator=entry.operator,
-        rig=entry.rig,
-        notes=entry.notes,
+        texts=entry.texts,
         identifier=entry.identifier,
         started=entry.start_time,
         duration=entry.duration_s or 0.0,
@@ -302,7 +304,7 @@ def assess(
     try:
         chosen, of_these = _model(model, recording)
         fitted = bool(of_these) and recording.sha256 in of_these
-        errors = compare(recording, chosen, "validation", drive, hashed=False).errors
+        errors = compare(Readings(recording, drive), chosen, "validation", hashed=False).errors
     except DearigError as error:
         unfit = str(error)
     progress(recording.name, 1.0)
@@ -324,7 +326,7 @@ def curves(
     errors, unfit = None, ""
     try:
         chosen, _ = _model(model, recording)
-        compared = compare(recording, chosen, "validation", drive, hashed=False)
+        compared = compare(Readings(recording, drive), chosen, "validation", hashed=False)
         drawn = _short(time, compared.model, _COLUMNS)
         residual = _short(time, compared.measured - compared.model, _COLUMNS)
         errors = compared.errors
@@ -382,7 +384,7 @@ def spectra(
     residual = None
     try:
         chosen, _ = _model(model, recording)
-        compared = compare(recording, chosen, "validation", drive, hashed=False)
+        compared = compare(Readings(recording, drive), chosen, "validation", hashed=False)
         residual = amplitude_density(compared.measured - compared.model, recording.rate)
     except DearigError:
         residual = None  # the curves say why
@@ -454,7 +456,11 @@ _RESULTS = (
 
 #: Groups of conditions, in the order in which they are shown.
 GROUPS = ("Run", "Sample", "Sequence", "Rig file", "Instruments")
-_SAMPLE = ("film", "load", "kinematics", "notes")
+_SAMPLE = (
+    "load",
+    "kinematics",
+    *(field.label.lower() for field in TEXTS.values() if not field.in_provenance),
+)
 
 
 def _conditions(recording: Recording) -> dict[tuple[str, str], str]:
@@ -472,12 +478,9 @@ def _conditions(recording: Recording) -> dict[tuple[str, str], str]:
         group = "Instruments" if what in instruments else "Sample" if what in _SAMPLE else "Run"
         # without the offset from UTC, which is the same for all
         found[group, what] = value[:19] if what == "start time" else readable(value)
-    for what, mean in (
-        ("temperature (°C)", recording.temperature_degC),
-        ("relative humidity (%)", recording.relative_humidity_percent),
-    ):
-        if mean is not None:
-            found["Run", what] = f"{mean:.1f}"
+    for name, mean in recording.conditions.items():
+        condition = CONDITIONS[name]
+        found["Run", f"{condition.label} ({condition.unit})"] = f"{mean:.1f}"
     found["Run", "events"] = str(len(recording.events))
     found["Sequence", "name"] = recording.title
     for group, text in (

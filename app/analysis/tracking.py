@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from dearig.analysis.readings.quality import inspect
+from dearig.analysis.readings.record import Readings
 from dearig.analysis.track_target import WITHIN, missed_parts, task_of
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -547,7 +547,7 @@ def _noise(recording: Recording) -> float:
 def _reading(recording: Recording) -> tuple[np.ndarray, np.ndarray | None]:
     """Return the displacement (N,) m of a recording, and which readings may be used."""
     try:
-        return recording.signal, inspect(recording, to_fit=False).valid
+        return recording.signal, Readings(recording).quality.valid
     except InputError as error:
         log.info("%s: nothing is learned from it: %s", recording.path, error)
         return recording.signal, np.zeros(recording.samples, dtype=bool)

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dearig.analysis.outcomes import ValidateOutcome
-from dearig.analysis.readings.record import Source, compare, open_all
+from dearig.analysis.readings.compare import compare
+from dearig.analysis.readings.opening import Source
+from dearig.analysis.readings.record import read_all
 from dearig.config.modelfile import ModelFile, load_model
 from dearig.progress import Progress, quiet
 
@@ -26,11 +28,11 @@ def validate_model(
     ``InputError``.
     """
     given = model if isinstance(model, ModelFile) else load_model(model)
-    opened = open_all(recordings)
+    opened, _ = read_all(recordings, drive)
     comparisons = []
-    for i, recording in enumerate(opened):
-        role = "train" if recording.sha256 in given.fitted else "validation"
-        comparisons.append(compare(recording, given.model, role, drive))
+    for i, readings in enumerate(opened):
+        role = "train" if readings.recording.sha256 in given.fitted else "validation"
+        comparisons.append(compare(readings, given.model, role))
         progress("validation", (i + 1) / len(opened))
     return ValidateOutcome(
         title=f"{given.name} on {len(opened)} recording{'s' if len(opened) > 1 else ''}",

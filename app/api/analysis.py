@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
-from dearig.analysis.readings.record import Source
+from dearig.analysis.readings.opening import Source
 from dearig.analysis.simulate import simulate_model
 from dearig.analysis.validate import validate_model
 from dearig.api.models import ModelSource, as_model_file
@@ -59,41 +59,53 @@ def identify(
     Parameters
     ----------
     recordings : recording, path, or several
-        What is fitted.
+        Recordings that are fitted.
     validate : recording, path, or several
-        Read once at the end, with no part in the fit or in a choice.
+        Recordings that are read once at the end, with no part in the fit or in a choice.
     method : str
         ``hybrid``, or ``de`` for the thesis's Algorithm 1 as printed.
     branches : int or several
-        Number of Maxwell branches; of several the one with the lowest information criterion on the
+        Number of Maxwell branches. Of several, the one with the lowest information criterion on the
         fitted recordings is kept.
     spring : str
         Strain energy of the equilibrium spring: ``gent``, ``neo-hookean``, ``arruda-boyce``,
         ``yeoh``, ``mooney-rivlin``, ``ogden``, ``ogden-two-terms``, ``extended-tube``; or
         ``choose`` for the most probable one on the fitted recordings.
     branch_spring : str
-        Strain energy of the branches: by default as ``spring`` where that is one of the first
-        three, else ``gent``.
+        Strain energy of the branches. The default is ``spring`` where that is one of the first
+        three, otherwise ``gent``.
     drive : str
         Voltage that drives the model: ``command`` or ``monitor``.
     rest_length_mm : float, optional
-        Measured length of the film under the load; computed from mu_0 where it is left out.
+        Measured length of the film under the load in mm. The default is computed from mu_0.
     rig_file : path or mapping, optional
         Film and load, in place of those in the recordings.
     seed : int
-        Of Algorithm 1.
+        Seed of Algorithm 1.
     intervals : bool
         Compute 95 % intervals.
     ended_early : str
-        Of recordings whose runs ended early: ``keep`` them, ``cut`` the end that may show a fault,
+        For recordings whose runs ended early: ``keep`` them, ``cut`` the end that may show a fault,
         or ``leave-out``.
     progress : callable, optional
-        Called with a stage and the fraction of it that is done.
+        Called with a stage and the fraction of it that is done (0 to 1).
+
+    Returns
+    -------
+    IdentifyResult
+        Model, parameters with intervals, and errors on every recording.
 
     Raises
     ------
     InputError
-        For recordings that cannot be fitted.
+        If the recordings cannot be fitted.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> fit = dearig.identify("train.h5", validate="other.h5")
+    >>> fit.parameters["mu_0"].value  # in Pa
+    >>> fit.save("model.toml")
     """
     outcome = identify_recordings(
         _some(recordings),
@@ -122,8 +134,32 @@ def validate(
 ) -> ValidateResult:
     """Compare a model with recordings: error tables like the thesis's Tables 4 and 5.
 
-    ``model`` is a model, a result with one, or the path of a model file. ``drive`` and ``progress``
-    are as for ``identify``. Raises ``InputError``.
+    Parameters
+    ----------
+    model : model, result or path
+        A ``Model``, a result that has one, or the path of a model file.
+    recordings : recording, path, or several
+        Recordings that are compared with the model.
+    drive : str
+        Voltage that drives the model: ``command`` or ``monitor``.
+    progress : callable, optional
+        Called with a stage and the fraction of it that is done (0 to 1).
+
+    Returns
+    -------
+    ValidateResult
+        Errors on every recording, in um or kPa and in per cent.
+
+    Raises
+    ------
+    InputError
+        If the model or a recording cannot be used.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> checked = dearig.validate("model.toml", ["a04.h5", "a06.h5"])
+    >>> checked.errors[0].rms  # in um
     """
     outcome = validate_model(
         as_model_file(model), _some(recordings), drive=drive, progress=progress
@@ -140,9 +176,33 @@ def simulate(
 ) -> Prediction:
     """Compute what a model predicts under a recording or a sequence.
 
-    ``drive`` is a recording, a sequence, the path of either, or the name of a preset. A sequence is
-    sampled at the rate of ``rig_file``; ``voltage`` of a recording is ``command`` or ``monitor``.
-    Raises ``InputError``.
+    Parameters
+    ----------
+    model : model, result or path
+        A ``Model``, a result that has one, or the path of a model file.
+    drive : recording, sequence, path or name of a preset
+        The voltage (or stretch) that drives the model. A sequence is sampled at the rate of
+        ``rig_file``.
+    rig_file : path or mapping, optional
+        Sample rate of a sequence.
+    voltage : str
+        Voltage of a recording that drives the model: ``command`` or ``monitor``.
+
+    Returns
+    -------
+    Prediction
+        Time in s, drive in V and displacement in m; of a film, stretch and nominal stress in Pa.
+
+    Raises
+    ------
+    InputError
+        If the model or the drive cannot be used.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> predicted = dearig.simulate("model.toml", "validation-a-0.4")
+    >>> predicted.response.max()  # in m
     """
     played = drive.loaded if isinstance(drive, Sequence) else drive
     settings = None if rig_file is None else load_rig(rig_file)[0]
@@ -165,33 +225,47 @@ def diagnose(
 ) -> DiagnoseResult:
     """Find the effects that the thesis's model of recordings lacks.
 
+    An interrupt of the kernel ends the search and keeps what was found; a second one raises
+    ``KeyboardInterrupt``.
+
     Parameters
     ----------
     recordings : recording, path, or several
-        What is fitted.
+        Recordings that are fitted.
     validate : recording, path, or several
-        Read once at the end: errors before and after on what no fit has used.
+        Recordings that are read once at the end: errors before and after on data that no fit used.
     branches : int
         Number of Maxwell branches of the baseline.
     spring, branch_spring : str
-        Strain energies of the baseline, as of ``identify``.
+        Strain energies of the baseline, as for ``identify``.
     drive : str
         Voltage that drives the model: ``command`` or ``monitor``.
     rig_file : path or mapping, optional
         Film and load in place of those in the recordings, and the limits of a proposed experiment.
     thorough : bool
-        Search without a time budget; otherwise for about a minute.
+        Search without a computing budget; otherwise for about a minute.
     ended_early : str
-        Of recordings whose runs ended early: ``keep`` them, ``cut`` the end that may show a fault,
+        For recordings whose runs ended early: ``keep`` them, ``cut`` the end that may show a fault,
         or ``leave-out``.
     progress : callable, optional
-        Called with a stage and the fraction of all the work that is done.
+        Called with a stage and the fraction of all the work that is done (0 to 1).
+
+    Returns
+    -------
+    DiagnoseResult
+        Verdict, effects with parameters, errors before and after, and a proposed experiment.
 
     Raises
     ------
     InputError
-        For recordings that cannot be diagnosed. An interrupt of the kernel ends the search and
-        keeps what was found; a second one raises ``KeyboardInterrupt``.
+        If the recordings cannot be diagnosed.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> found = dearig.diagnose("train.h5", validate="other.h5")
+    >>> found.effects
+    >>> found.to_html("report.html")
     """
     outcome = diagnose_recordings(
         _some(recordings),

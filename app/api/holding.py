@@ -32,7 +32,13 @@ _DEFAULT = HoldOptions()
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HoldResult:
-    """A displacement that was held; ``outcome`` has everything that is known of it, in SI units."""
+    """Result of a hold.
+
+    Attributes
+    ----------
+    outcome : HoldOutcome
+        All numbers of the hold, in SI units.
+    """
 
     outcome: holding.HoldOutcome
 
@@ -47,17 +53,57 @@ class HoldResult:
         return self.outcome.rms * 1e6
 
     def plot(self) -> Figure:
-        """Return a figure of the mean error and the mean correction of every minute."""
+        """Plot the mean error and the mean correction of every minute.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+        """
         return hold_figure(self.outcome)
 
     def to_html(self, path: str | Path) -> Path:
-        """Write a page with the summary and the figure to ``path``, replacing it."""
+        """Write a page with the summary and the figure.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_page(
             path, self._title, "Hold", self._repr_html_(), (origin_of(self.recording),)
         )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write all numbers (``.json``) to ``path`` and return the path. Raises ``InputError``."""
+        """Write all numbers.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.json``.
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written, or has another ending.
+        """
         out = check_output(path, overwrite)
         if out.suffix != ".json":
             raise InputError(f"{path}: all numbers are written as JSON; end the name in .json")
@@ -108,21 +154,45 @@ def hold(
         Length of the hold in s.
     out : path
         The recording.
-    rig, rig_file
-        As for ``record``. The limit of the time at voltage must allow the hold.
+    rig : str
+        ``sim``, ``sim:SEED`` for a simulated rig with a hidden effect, ``daqmx:Dev1`` for a card.
+    rig_file : path or mapping, optional
+        Film, load, instruments and limits. The limit of the time at voltage must allow the hold.
     options : HoldOptions
-        Authority, rate limit and response of the feedback, and what waits for output.
+        Authority (fraction of the voltage), rate limit in 1/s, and response, rise and queue of the
+        feedback in s.
     feedback : bool
         False plays the model's voltage alone.
-    operator, film, notes, seed, paced, faults, overwrite, progress
-        As for ``record``.
+    operator, film, notes : str
+        Texts that are kept in the recording.
+    seed : int
+        Seed of the simulated noise.
+    paced : bool
+        Simulate in real time; otherwise as fast as possible.
+    faults : iterable of str
+        Faults of a simulated rig, such as ``arc@3.2`` (kind, seconds).
+    overwrite : bool
+        Replace the recording.
+    progress : callable, optional
+        Called with a stage and the fraction of it that is done (0 to 1).
+
+    Returns
+    -------
+    HoldResult
+        The recording, the error in um, and error and correction of every minute.
 
     Raises
     ------
     InputError
-        For a displacement that cannot be held, and for a voltage that the gate refuses.
+        If the displacement cannot be held, or the gate refuses the voltage.
     SafetyStop, InstrumentFault, DiskFault, Interrupted
-        For a run that ended early. The rig is safe, and the recording so far is kept.
+        If the run ended early. The rig is safe, and the recording so far is kept.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> held = dearig.hold(0.5, "model.toml", seconds=60.0, out="hold.h5")
+    >>> held.rms_um
     """
     settings, text = load_rig(rig_file)
     outcome = holding.hold(

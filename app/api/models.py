@@ -18,27 +18,90 @@ __all__ = ["Model", "ModelSource", "as_model_file", "read_model"]
 
 
 class Model(ModelFile):
-    """A fitted model: ``name``, ``model`` (film, load, springs, effects) and ``history``.
+    """A fitted model.
 
-    ``Model.open("model.toml")`` reads a model file.
+    Attributes
+    ----------
+    name : str
+        Name of the model.
+    model : Actuator or Strip
+        Film, load, springs and effects, in SI units.
+    history : mapping
+        Origin of the model: recordings with their checksums, and settings.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> model = dearig.Model.open("model.toml")
     """
 
     @classmethod
     def open(cls, path: str | Path) -> Model:
-        """Read the model file at ``path``. Raises ``InputError``."""
+        """Read a model file.
+
+        Parameters
+        ----------
+        path : str or Path
+            A model file (TOML).
+
+        Returns
+        -------
+        Model
+            The model in the file.
+
+        Raises
+        ------
+        InputError
+            If the file is not a model that can be read.
+        """
         return cls.of(load_model(path))
 
     @classmethod
     def of(cls, file: ModelFile) -> Model:
-        """Return ``file`` with what a notebook needs."""
+        """Return the content of a model file as a model for a notebook.
+
+        Parameters
+        ----------
+        file : ModelFile
+            Content of a model file.
+
+        Returns
+        -------
+        Model
+            The same model, with ``save`` and a display.
+        """
         return file if isinstance(file, cls) else cls(file.name, file.model, file.history)
 
     def to_toml(self) -> str:
-        """Return the text of a model file."""
+        """Return the text of a model file.
+
+        Returns
+        -------
+        str
+            The model in TOML, with units in the names of the keys.
+        """
         return model_toml(self.name, self.model, self.history)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write a model file (TOML) to ``path`` and return the path. Raises ``InputError``."""
+        """Write a model file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file (``.toml``).
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written.
+        """
         return save_model(path, self.name, self.model, self.history, overwrite)
 
     def _repr_html_(self) -> str:
@@ -95,7 +158,23 @@ ModelSource = str | Path | ModelFile | _HasModel
 
 
 def as_model_file(source: ModelSource) -> str | Path | ModelFile:
-    """Return what the analysis takes: a path as it is, a model, or the model of a result."""
+    """Return a model as the analysis takes it.
+
+    Parameters
+    ----------
+    source : model, result or path
+        A ``Model``, a result that has one, or the path of a model file.
+
+    Returns
+    -------
+    str, Path or ModelFile
+        A path unchanged, otherwise the model.
+
+    Raises
+    ------
+    TypeError
+        If ``source`` is neither.
+    """
     if isinstance(source, str | Path | ModelFile):
         return source
     file = getattr(source, "model", None)
@@ -107,6 +186,22 @@ def as_model_file(source: ModelSource) -> str | Path | ModelFile:
 
 
 def read_model(source: ModelSource) -> ModelFile:
-    """Return the model of ``source``, read where it is a path. Raises ``InputError``."""
+    """Return a model, read from its file where a path is given.
+
+    Parameters
+    ----------
+    source : model, result or path
+        A ``Model``, a result that has one, or the path of a model file.
+
+    Returns
+    -------
+    ModelFile
+        The model.
+
+    Raises
+    ------
+    InputError
+        If the file is not a model that can be read.
+    """
     given = as_model_file(source)
     return given if isinstance(given, ModelFile) else load_model(given)

@@ -27,7 +27,13 @@ __all__ = ["Prediction"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Prediction:
-    """What a model predicts under a drive; arrays are (N,) in SI units."""
+    """Prediction of a model under a drive; arrays are (N,) in SI units.
+
+    Attributes
+    ----------
+    prediction : dearig.analysis.simulate.Prediction
+        All values, with the highest true field in V/m and the static pull-in voltage in V.
+    """
 
     prediction: simulate.Prediction
 
@@ -54,9 +60,17 @@ class Prediction:
         return self.prediction.values["displacement" if actuator else "nominal_stress"]
 
     def to_pandas(self) -> DataFrame:
-        """Return a data frame over ``time`` in s, with the units in ``frame.attrs``.
+        """Return the values as a data frame.
 
-        Raises ``InputError`` where pandas is not installed.
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each sample over ``time`` in s; the units are in ``frame.attrs``.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
         """
         lib = import_extra("pandas", "notebook", "to_pandas")
         values = dict(self.prediction.values)
@@ -66,15 +80,55 @@ class Prediction:
         return frame
 
     def plot(self) -> Figure:
-        """Return a figure of the drive and the predicted response over time."""
+        """Plot the drive and the predicted response over time.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+        """
         return signal_figure(self.prediction.kind, self.time, self.drive, model=self.response)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write a recording (``.h5``) or a table (``.csv``) to ``path`` and return the path."""
+        """Write a recording or a table.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.h5`` (recording) or ``.csv`` (table).
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written, or has another ending.
+        """
         return simulate.save_prediction(self.prediction, path, overwrite)
 
     def to_html(self, path: str | Path) -> Path:
-        """Write a page with the main facts and a figure to ``path``, replacing it."""
+        """Write a page with the main facts and a figure.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_page(
             path, self.prediction.title, "Prediction", self._repr_html_(), (self._origin,)
         )

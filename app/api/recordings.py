@@ -51,20 +51,42 @@ RigSource = str | Path | Mapping[str, Mapping[str, object]]
 class Recording(stored.Recording):
     """A recording: arrays (N,) in SI units, read when they are first used, and its metadata.
 
-    ``margins`` say how near the run was planned to come to each limit of the rig; they are empty
-    for a recording that was opened.
+    Attributes
+    ----------
+    margins : tuple of Margin
+        Distance of the planned run from each limit of the rig; empty for a recording that was
+        opened.
     """
 
     margins: tuple[Margin, ...] = ()
 
     @classmethod
     def of(cls, recording: stored.Recording, margins: tuple[Margin, ...] = ()) -> Recording:
-        """Return ``recording`` with what a notebook needs."""
+        """Return a stored recording as one for a notebook.
+
+        Parameters
+        ----------
+        recording : dearig.recording.reading.recording.Recording
+            The stored recording.
+        margins : tuple of Margin
+            Margins of the planned run.
+
+        Returns
+        -------
+        Recording
+            The same data, with ``plot``, ``save`` and ``to_html``.
+        """
         known = {f.name: getattr(recording, f.name) for f in fields(stored.Recording)}
         return cls(**known, margins=margins)
 
     def plot(self) -> Figure:
-        """Return a figure of the drive and the response over time, with the overlay model's."""
+        """Plot the drive and the response over time, with the overlay model's.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+        """
         return signal_figure(
             self.kind,
             self.time,
@@ -74,14 +96,48 @@ class Recording(stored.Recording):
         )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Copy the recording's file to ``path`` and return the path. Raises ``InputError``."""
+        """Copy the recording's file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The new file (``.h5``).
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written.
+        """
         out = check_output(path, overwrite, self.path)
         with replaced_when_done(out, overwrite) as partial:
             shutil.copyfile(self.path, partial)
         return out
 
     def to_html(self, path: str | Path) -> Path:
-        """Write a page with the main facts and a figure to ``path``, replacing it."""
+        """Write a page with the main facts and a figure.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_page(path, self.name, "Recording", self._repr_html_(), (origin_of(self),))
 
     def __repr__(self) -> str:
@@ -115,9 +171,28 @@ _EVENTS_MAX = 5  # of a card; ``recording.events`` has them all
 
 
 def open(path: str | Path) -> Recording:  # noqa: A001  (the name of the interface)
-    """Return the recording in the file at ``path``.
+    """Open the recording in a file.
 
-    Raises ``InputError`` where the file is no recording that can be read.
+    Parameters
+    ----------
+    path : str or Path
+        An HDF5 recording.
+
+    Returns
+    -------
+    Recording
+        Arrays in SI units, read when they are first used, and metadata.
+
+    Raises
+    ------
+    InputError
+        If the file is not a recording that can be read.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> run = dearig.open("run.h5")
+    >>> run.displacement.max()  # in m
     """
     return Recording.of(open_recording(path))
 
@@ -141,42 +216,55 @@ def record(
 ) -> Recording:
     """Play a sequence on a rig, record it, and return the recording.
 
+    An interrupt of the kernel ramps the voltage down to 0 V.
+
     Parameters
     ----------
     sequence : Sequence, path or name of a preset
-        What is played.
+        The voltage that is played.
     rig : str
         ``sim``, ``sim:SEED`` for a simulated rig with a hidden effect, ``daqmx:Dev1`` for a card.
     path : path, optional
-        The file to write. Without one the recording is in a temporary file, which is deleted when
-        the returned value is; ``Recording.save`` keeps it.
+        The file to write. Without one the recording is in a temporary file, which is deleted
+        together with the returned value; ``Recording.save`` keeps it.
     rig_file : path or mapping, optional
         Film, load, instruments and limits: a rig file, or its tables such as
-        ``{"load": {"mass_g": 50}}``. The thesis's rig where it is left out.
+        ``{"load": {"mass_g": 50}}``. The default is the thesis's rig.
     model : model, result or path, optional
         The film and load of the simulated rig ``sim``.
     overlay : model, result or path, optional
-        A model that runs in step with the measurement and is recorded with it.
+        A model that is simulated with the measurement and recorded with it.
     operator, film, notes : str
-        Kept in the recording.
+        Texts that are kept in the recording.
     seed : int
-        Of the simulated noise.
+        Seed of the simulated noise.
     paced : bool
         Simulate in real time; otherwise as fast as possible.
     faults : iterable of str
-        What goes wrong in a simulated rig, such as ``arc@3.2`` (kind, seconds).
+        Faults of a simulated rig, such as ``arc@3.2`` (kind, seconds).
     overwrite : bool
         Replace the file at ``path``.
     progress : callable, optional
-        Called with a stage and the fraction of it that is done.
+        Called with a stage and the fraction of it that is done (0 to 1).
+
+    Returns
+    -------
+    Recording
+        The recording, with the margins to the limits of the rig.
 
     Raises
     ------
     InputError
-        For a sequence that the rig's limits do not allow, before anything is touched.
+        If the rig's limits do not allow the sequence. Nothing was touched then.
     SafetyStop, InstrumentFault, DiskFault, Interrupted
-        For a run that ended early. The rig is safe, and the file that the message names is kept,
-        also a temporary one. An interrupt of the kernel ramps the voltage down to 0 V.
+        If the run ended early. The rig is safe, and the file that the message names is kept,
+        also a temporary one.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> run = dearig.record("thesis", rig="sim:2003", path="run.h5")
+    >>> run.plot()
     """
     settings, text = load_rig(rig_file)
     loaded = as_loaded(sequence)
@@ -230,7 +318,23 @@ def _actuator(source: ModelSource) -> tuple[ModelFile, Actuator]:
 
 
 def load_rig(source: RigSource | None) -> tuple[RigFile, str]:
-    """Return the settings in a rig file or its tables, and the text that a recording keeps."""
+    """Return the settings of a rig file, and the text that a recording keeps.
+
+    Parameters
+    ----------
+    source : path, mapping or None
+        A rig file or its tables; None is the thesis's rig.
+
+    Returns
+    -------
+    tuple of RigFile and str
+        The settings and their TOML text.
+
+    Raises
+    ------
+    InputError
+        If the settings cannot be used.
+    """
     if isinstance(source, Mapping):
         text = tomli_w.dumps({name: dict(table) for name, table in source.items()})
         return parse_rig_file(text), text

@@ -53,7 +53,13 @@ def _named(comparisons: Sequence[Comparison], name: str, others: Sequence[str]) 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IdentifyResult:
-    """A finished identification; ``outcome`` has everything that is known of it."""
+    """Result of an identification.
+
+    Attributes
+    ----------
+    outcome : IdentifyOutcome
+        All numbers of the fit, in SI units.
+    """
 
     outcome: IdentifyOutcome
 
@@ -78,10 +84,23 @@ class IdentifyResult:
         return warnings_of(self.outcome)
 
     def plot(self, what: str = "overview") -> Figure:
-        """Return a figure.
+        """Plot the fit.
 
-        ``what`` is ``overview``, ``parameters``, ``branches`` (where several numbers were tried),
-        ``residual`` (of the first recording) or the name of a recording. Raises ``InputError``.
+        Parameters
+        ----------
+        what : str
+            ``overview``, ``parameters``, ``branches`` (where several numbers were fitted),
+            ``residual`` (of the first recording) or the name of a recording.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+
+        Raises
+        ------
+        InputError
+            If nothing of that name can be plotted.
         """
         outcome = self.outcome
         if what == "overview":
@@ -99,13 +118,44 @@ class IdentifyResult:
         return figures.comparison_figure(_named(every, what, others))
 
     def to_html(self, path: str | Path) -> Path:
-        """Write the report to ``path``, replacing it. Raises ``InputError``."""
+        """Write the report.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_report(self.outcome, path)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the model (``.toml``) or all numbers (``.json``) to ``path`` and return the path.
+        """Write the model or all numbers.
 
-        Raises ``InputError``.
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.toml`` (model) or ``.json`` (all numbers).
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written, or has another ending.
         """
         return _save(self, outcome_json(self.outcome), Path(path), overwrite)
 
@@ -127,7 +177,13 @@ class IdentifyResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ValidateResult:
-    """A finished validation; ``outcome`` has everything that is known of it."""
+    """Result of a validation.
+
+    Attributes
+    ----------
+    outcome : ValidateOutcome
+        All numbers of the comparison, in SI units.
+    """
 
     outcome: ValidateOutcome
 
@@ -142,9 +198,23 @@ class ValidateResult:
         return warnings_of(self.outcome)
 
     def plot(self, what: str = "") -> Figure:
-        """Return a figure of the recording ``what``, by default the one with the largest error.
+        """Plot measurement and model.
 
-        ``residual`` is that one's residual. Raises ``InputError`` for another name.
+        Parameters
+        ----------
+        what : str
+            The name of a recording, by default the one with the largest error; or ``residual`` for
+            the residual of that one.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+
+        Raises
+        ------
+        InputError
+            If nothing of that name can be plotted.
         """
         every = self.outcome.comparisons
         worst = max(every, key=lambda c: c.errors.rms)
@@ -153,11 +223,45 @@ class ValidateResult:
         return figures.comparison_figure(_named(every, what or worst.name, ["residual"]))
 
     def to_html(self, path: str | Path) -> Path:
-        """Write the report to ``path``, replacing it. Raises ``InputError``."""
+        """Write the report.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_report(self.outcome, path)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write all numbers (``.json``) to ``path`` and return the path. Raises ``InputError``."""
+        """Write all numbers.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.json``.
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written, or has another ending.
+        """
         out = Path(path)
         if out.suffix != ".json":
             raise InputError(f"{out}: a validation is saved as numbers, in a file that ends .json")
@@ -179,7 +283,13 @@ class ValidateResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DiagnoseResult:
-    """A finished (or interrupted) diagnosis; ``outcome`` has everything that is known of it."""
+    """Result of a diagnosis, finished or interrupted.
+
+    Attributes
+    ----------
+    outcome : DiagnoseOutcome
+        All numbers of the search, in SI units.
+    """
 
     outcome: DiagnoseOutcome
 
@@ -236,10 +346,22 @@ class DiagnoseResult:
         return words.warnings(self.outcome)
 
     def plot(self, what: str = "errors") -> Figure:
-        """Return a figure.
+        """Plot errors or a recording before and after.
 
-        ``what`` is ``errors`` (RMS of every recording before and after) or the name of a recording.
-        Raises ``InputError``.
+        Parameters
+        ----------
+        what : str
+            ``errors`` (RMS of every recording before and after) or the name of a recording.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+
+        Raises
+        ------
+        InputError
+            If nothing of that name can be plotted.
         """
         before, after = self.outcome.before, self.outcome.after
         first = {c.name: c for c in (*before.train, *before.validation)}
@@ -251,13 +373,44 @@ class DiagnoseResult:
         return before_after_figure(first[chosen.name], chosen)
 
     def to_html(self, path: str | Path) -> Path:
-        """Write the report to ``path``, replacing it. Raises ``InputError``."""
+        """Write the report.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_report(self.outcome, path)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the model (``.toml``) or all numbers (``.json``) to ``path`` and return the path.
+        """Write the model or all numbers.
 
-        Raises ``InputError``.
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.toml`` (model) or ``.json`` (all numbers).
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written, or has another ending.
         """
         return _save(self, diagnosis_json(self.outcome), Path(path), overwrite)
 

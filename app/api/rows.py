@@ -98,9 +98,17 @@ class Rows(Sequence[T], Generic[T]):
         return "\n".join(repr(row) for row in self._rows) or "no rows"
 
     def to_pandas(self) -> DataFrame:
-        """Return the rows as a data frame whose index is their name.
+        """Return the rows as a data frame.
 
-        Raises ``InputError`` where pandas is not installed.
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each name, which is the index.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
         """
         lib = import_extra("pandas", "notebook", "to_pandas")
         frame: DataFrame = lib.DataFrame([vars(row) for row in self._rows])
@@ -127,7 +135,20 @@ def _shown(value: object) -> str:
 
 
 def parameters_of(estimates: Sequence[Estimate], effect: str = "") -> list[Parameter]:
-    """Return ``estimates`` as parameters of ``effect``."""
+    """Return estimates as parameters.
+
+    Parameters
+    ----------
+    estimates : sequence of Estimate
+        Estimates of a fit, in SI units.
+    effect : str
+        Effect that they belong to; empty for the springs.
+
+    Returns
+    -------
+    list of Parameter
+        One parameter for each estimate.
+    """
     return [
         Parameter(e.name, e.value, e.unit, e.low, e.high, bool(e.determined), effect)
         for e in estimates
@@ -135,7 +156,18 @@ def parameters_of(estimates: Sequence[Estimate], effect: str = "") -> list[Param
 
 
 def errors_of(comparisons: Iterable[Comparison]) -> Rows[RecordingErrors]:
-    """Return the errors of each comparison, in the unit that people use for its kind."""
+    """Return the errors of each comparison.
+
+    Parameters
+    ----------
+    comparisons : iterable of Comparison
+        Measurement and model of each recording.
+
+    Returns
+    -------
+    Rows of RecordingErrors
+        Errors in um for actuators and in kPa for films.
+    """
     rows = []
     for c in comparisons:
         shown = SHOWN[c.kind]

@@ -91,7 +91,23 @@ class Sequence:
 
     @classmethod
     def open(cls, source: str | Path) -> Sequence:
-        """Return the sequence in the file ``source``, or the preset of that name."""
+        """Return the sequence of a file or of a preset.
+
+        Parameters
+        ----------
+        source : str or Path
+            A sequence file, or the name of a preset.
+
+        Returns
+        -------
+        Sequence
+            The sequence.
+
+        Raises
+        ------
+        InputError
+            If the file is not a sequence that can be played.
+        """
         loaded = load_sequence(source)
         if str(source) in PRESETS:
             folder, label, text = Path(), f"preset {source}", PRESETS[str(source)]
@@ -101,23 +117,71 @@ class Sequence:
 
     @classmethod
     def from_toml(cls, text: str, *, folder: str | Path = "") -> Sequence:
-        """Return the sequence in TOML ``text``; the files of ``csv`` segments are in ``folder``."""
+        """Return the sequence in a TOML text.
+
+        Parameters
+        ----------
+        text : str
+            Content of a sequence file.
+        folder : str or Path
+            Folder of the files of ``csv`` segments.
+
+        Returns
+        -------
+        Sequence
+            The sequence.
+
+        Raises
+        ------
+        InputError
+            If the text is not a sequence that can be played.
+        """
         loaded = parse_sequence(text, "the sequence", Path(folder))
         label = f"sequence {loaded.sequence.name!r}"
         return cls._of(tomllib.loads(text), Path(folder), label, text)
 
     @staticmethod
     def kinds() -> tuple[str, ...]:
-        """Return the kinds of segments."""
+        """Return the kinds of segments.
+
+        Returns
+        -------
+        tuple of str
+            Names for ``add``, and of the methods that add a segment.
+        """
         return tuple(SEGMENT_KINDS)
 
     @staticmethod
     def presets() -> tuple[str, ...]:
-        """Return the names of the presets."""
+        """Return the presets.
+
+        Returns
+        -------
+        tuple of str
+            Names for ``open`` and ``dearig.record``.
+        """
         return tuple(PRESETS)
 
     def add(self, kind: str, **keys: object) -> Sequence:
-        """Return a sequence with a segment of ``kind`` at the end. Raises ``InputError``."""
+        """Return a sequence with one more segment at the end.
+
+        Parameters
+        ----------
+        kind : str
+            Kind of the segment, one of ``kinds()``.
+        **keys
+            Keys of a sequence file, with units in their names: ``amplitude_kV``, ``duration_s``.
+
+        Returns
+        -------
+        Sequence
+            A new sequence.
+
+        Raises
+        ------
+        InputError
+            If the kind, a key or a value is wrong.
+        """
         segments = [*self._data.get("segment", []), {"kind": kind, **_plain(keys)}]
         return self._of({**self._data, "segment": segments}, self._folder, self._label)
 
@@ -185,22 +249,78 @@ class Sequence:
         return self.loaded.sequence.duration
 
     def sample(self, rate_Hz: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return time (N,) in s and voltage (N,) in V at ``rate_Hz``. Raises ``InputError``."""
+        """Return the voltage at a sample rate.
+
+        Parameters
+        ----------
+        rate_Hz : float
+            Samples per second in Hz.
+
+        Returns
+        -------
+        tuple of numpy.ndarray
+            Time (N,) in s and voltage (N,) in V.
+
+        Raises
+        ------
+        InputError
+            If the sequence cannot be played as a whole.
+        """
         return self.loaded.sample(rate_Hz)
 
     def plot(self) -> Figure:
-        """Return a figure of the voltage over time, at the default sample rate of a rig."""
+        """Plot the voltage over time, at the default sample rate of a rig.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+        """
         return voltage_figure(*self.sample(float(RigFile().card.sample_rate_Hz)))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write a sequence file (TOML) to ``path`` and return the path. Raises ``InputError``."""
+        """Write a sequence file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file (``.toml``).
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written.
+        """
         out = check_output(path, overwrite)
         with replaced_when_done(out, overwrite) as partial:
             partial.write_text(self.toml, encoding="utf-8")
         return out
 
     def to_html(self, path: str | Path) -> Path:
-        """Write a page with the voltage over time to ``path``, replacing it."""
+        """Write a page with the voltage over time.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_page(path, self.name, "Sequence", self._repr_html_())
 
     def __repr__(self) -> str:
@@ -238,7 +358,23 @@ SequenceSource = str | Path | Sequence | LoadedSequence
 
 
 def as_loaded(source: SequenceSource) -> LoadedSequence:
-    """Return the sequence as a run takes it."""
+    """Return a sequence as a run takes it.
+
+    Parameters
+    ----------
+    source : Sequence, LoadedSequence, path or name of a preset
+        The sequence.
+
+    Returns
+    -------
+    LoadedSequence
+        The checked sequence with its TOML text.
+
+    Raises
+    ------
+    InputError
+        If it cannot be played as a whole.
+    """
     if isinstance(source, Sequence):
         return source.loaded
     return source if isinstance(source, LoadedSequence) else load_sequence(source)

@@ -1,4 +1,4 @@
-"""A displacement that the film shall follow: the voltage for it, and runs that learn."""
+"""A displacement that the film follows: the voltage for it, and runs that learn."""
 
 from __future__ import annotations
 
@@ -48,7 +48,15 @@ TargetSource = str | Path | tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Inversion:
-    """The voltage with which a model follows a target; arrays are (N,) in SI units."""
+    """Voltage with which a model follows a target; arrays are (N,) in SI units.
+
+    Attributes
+    ----------
+    name : str
+        Name of the target.
+    inversion : dearig.model.control.Inversion
+        All values of the inversion.
+    """
 
     name: str
     inversion: control.Inversion
@@ -89,13 +97,34 @@ class Inversion:
         return self.inversion.feasible
 
     def plot(self) -> Figure:
-        """Return a figure of the voltage, and of target and response over time."""
+        """Plot the voltage, and target and response over time.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+        """
         return signal_figure("actuator", self.time, self.voltage, self.target, self.response)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the voltage as a table (``.csv``), which a sequence can play; return the path.
+        """Write the voltage as a table that a sequence can play.
 
-        Raises ``InputError``.
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.csv``; the columns are ``time_s`` and ``voltage_V``.
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written, or has another ending.
         """
         out = check_output(path, overwrite)
         if out.suffix != ".csv":
@@ -107,7 +136,23 @@ class Inversion:
         return out
 
     def to_html(self, path: str | Path) -> Path:
-        """Write a page with the main facts and a figure to ``path``, replacing it."""
+        """Write a page with the main facts and a figure.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_page(path, self.name, "Voltage for a target", self._repr_html_())
 
     def __repr__(self) -> str:
@@ -127,7 +172,13 @@ class Inversion:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrackResult:
-    """A target that was followed; ``outcome`` has everything that is known of it."""
+    """Result of following a target.
+
+    Attributes
+    ----------
+    outcome : TrackOutcome
+        All numbers of the runs, in SI units.
+    """
 
     outcome: TrackOutcome
 
@@ -150,17 +201,67 @@ class TrackResult:
         return Recording.of(open_recording(best.recording), best.margins)
 
     def plot(self, what: str = "runs") -> Figure:
-        """Return a figure of the ``runs`` over time, or of the ``errors`` of all iterations."""
+        """Plot runs or errors.
+
+        Parameters
+        ----------
+        what : str
+            ``runs`` (over time) or ``errors`` (of all iterations).
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, with axes in the units that its labels name.
+
+        Raises
+        ------
+        InputError
+            If nothing of that name can be plotted.
+        """
         if what not in ("runs", "errors"):
             raise InputError(f"{what!r} cannot be plotted; what can is runs, errors")
         return (runs_figure if what == "runs" else errors_figure)(self.outcome)
 
     def to_html(self, path: str | Path) -> Path:
-        """Write the report to ``path``, replacing it. Raises ``InputError``."""
+        """Write the report.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
         return write_track_report(self.outcome, path)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write all numbers (``.json``) to ``path`` and return the path. Raises ``InputError``."""
+        """Write all numbers.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.json``.
+        overwrite : bool
+            Replace a file that exists.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file exists, cannot be written, or has another ending.
+        """
         out = check_output(path, overwrite)
         if out.suffix != ".json":
             raise InputError(f"{path}: all numbers are written as JSON; end the name in .json")
@@ -189,18 +290,31 @@ def invert(
     Parameters
     ----------
     model : model, result or path
-        An actuator, such as a diagnosis has found.
+        An actuator, for example the model of a diagnosis.
     target : path, or two arrays
         A target file (TOML or CSV), or time in s and displacement in m from the loaded rest state,
         which starts and ends at 0.
     rig_file : path or mapping, optional
         Limits and sample rate.
 
+    Returns
+    -------
+    Inversion
+        Voltage in V, the displacement that is expected in m, and the parts of the target that the
+        film cannot follow.
+
     Raises
     ------
     InputError
-        For a target or a model that cannot be used. What the film cannot reach raises nothing: see
-        ``Inversion.unreachable``.
+        If the target or the model cannot be used. An unreachable part of the target raises nothing:
+        see ``Inversion.unreachable``.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> found = dearig.invert("model.toml", "target.toml")
+    >>> found.feasible
+    >>> found.save("voltage.csv")
     """
     loaded, settings = _target(target), load_rig(rig_file)[0]
     file = read_model(model)
@@ -235,30 +349,56 @@ def track(
 
     Parameters
     ----------
-    target, model, rig_file
-        As for ``invert``.
+    target : path, or two arrays
+        A target file (TOML or CSV), or time in s and displacement in m from the loaded rest state,
+        which starts and ends at 0.
+    model : model, result or path
+        An actuator, for example the model of a diagnosis.
     out : path
         Folder for the recordings and the sequences that were played.
     rig : str
         ``sim``, ``sim:SEED`` for a simulated rig with a hidden effect, ``daqmx:Dev1`` for a card.
+    rig_file : path or mapping, optional
+        Film, load, instruments and limits.
     iterations : int
         Number of runs that learn from the one before.
     compare : model, result or path, optional
-        Before, play the voltage of this model, such as the thesis's, and that of a linear map. It
-        is followed in place of ``model`` if its run speaks against that.
+        First play the voltage of this model, such as the thesis's, and that of a linear map. It
+        is followed in place of ``model`` if its run contradicts ``model``.
     nearest : bool
-        Follow the nearest feasible target where the film cannot follow the asked one.
+        Follow the nearest feasible target where the film cannot follow the requested one.
     within_um : float
         Distance from the target in um that is accepted without ``nearest``.
-    operator, film, notes, seed, paced, faults, overwrite, progress
-        As for ``record``.
+    operator, film, notes : str
+        Texts that are kept in the recording.
+    seed : int
+        Seed of the simulated noise.
+    paced : bool
+        Simulate in real time; otherwise as fast as possible.
+    faults : iterable of str
+        Faults of a simulated rig, such as ``arc@3.2`` (kind, seconds).
+    overwrite : bool
+        Replace recordings in ``out``.
+    progress : callable, optional
+        Called with a stage and the fraction of it that is done (0 to 1).
+
+    Returns
+    -------
+    TrackResult
+        All runs with their errors in m, and the recording of the best.
 
     Raises
     ------
     InputError
-        For a target that cannot be reached, and for a voltage that the gate refuses.
+        If the target cannot be reached, or the gate refuses a voltage.
     SafetyStop, InstrumentFault, DiskFault, Interrupted
-        For a run that ended early. The rig is safe, and the recordings so far are kept.
+        If a run ended early. The rig is safe, and the recordings so far are kept.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> followed = dearig.track("target.toml", "model.toml", out="runs")
+    >>> followed.plot("errors")
     """
     settings, text = load_rig(rig_file)
     outcome = follow(

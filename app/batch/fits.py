@@ -30,6 +30,7 @@ from dearig.batch.numbers import errors_of, parameters_of
 from dearig.config.modelfile import load_model
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
+from dearig.recording.content.fields import CONDITIONS, TEXTS
 from dearig.recording.files import file_sha256, journal_of, one_line
 from dearig.recording.reading.reader import open_recording
 from dearig.recording.reading.recording import Recording
@@ -195,12 +196,9 @@ def about(recording: Recording) -> Row:
     return {
         "sha256": recording.sha256,
         "started": str(noted.get("start_time", "")),
-        "film": recording.film_id,
-        "rig": str(noted.get("rig", "")),
-        "operator": str(noted.get("operator", "")),
+        **{f.column: recording.texts.get(key, "") for key, f in TEXTS.items() if f.column},
         "title": recording.title,
-        "temperature_degC": recording.temperature_degC,
-        "relative_humidity_percent": recording.relative_humidity_percent,
+        **{name: recording.conditions.get(name) for name in CONDITIONS},
         "duration_s": recording.duration,
         "samples": recording.samples,
         "complete": recording.complete,

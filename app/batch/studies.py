@@ -200,7 +200,7 @@ def study_films(
         progress("reading", i / len(subjects))
         try:
             key = key_of(subject.path, subject.name, options)
-            film = glance(subject.path, subject.name, subject.path.stat().st_size).film_id
+            film = glance(subject.path, subject.name, subject.path.stat().st_size).film
         except OSError as error:
             rows[subject.name] = _unreadable(subject, error)
             continue

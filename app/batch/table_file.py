@@ -15,6 +15,7 @@ from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.input_file import read_input
 from dearig.printable import no_formula, unmarked
+from dearig.recording.content.fields import TEXTS
 from dearig.recording.files import in_words, replaced_when_done, write_whole
 
 __all__ = ["columns_of", "read_table", "write_csv", "write_parquet"]
@@ -23,7 +24,9 @@ __all__ = ["columns_of", "read_table", "write_csv", "write_parquet"]
 _TABLE_BYTES = 2**29
 _TRUTHS = {"True": True, "False": False}
 #: Columns that are names, also where they look like numbers.
-_NAMES = frozenset({"recording", "film", "rig", "operator", "title", "run", "reason", "sha256"})
+_NAMES = frozenset(
+    {"recording", "title", "run", "reason", "sha256", *(f.column for f in TEXTS.values())}
+)
 
 
 def columns_of(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dearig.errors import InputError
+from dearig.recording.content.fields import CONDITIONS
 
 __all__ = [
     "FREEDOM_MIN",
@@ -26,12 +27,6 @@ __all__ = [
     "films_in",
 ]
 
-#: Label, unit, column of the table, and range below which it counts as hardly varied: that of a
-#: room that is held within a standard atmosphere of class 1 (ISO 291: 1 °C and 5 % either way).
-_ENVIRONMENT = (
-    ("temperature", "°C", "temperature_degC", 2.0),
-    ("humidity", "% RH", "relative_humidity_percent", 10.0),
-)
 _CYCLES = "cycles"
 _SECONDS_A_DAY = 86400.0
 #: Degrees of freedom, at least: with one, an interval is 12.7 standard errors wide on either side,
@@ -96,8 +91,8 @@ def columns_in(
     if against:
         return [_named(rows, name) for name in against]
     found = [
-        Column(label, unit, _numbers(rows, name), hardly)
-        for label, unit, name, hardly in _ENVIRONMENT
+        Column(c.short or c.label, c.slope_unit or c.unit, _numbers(rows, name), c.tight)
+        for name, c in CONDITIONS.items()
         if any(row.get(name) is not None for row in rows)
     ]
     days = days_of_films(rows, films)

@@ -361,7 +361,5 @@ def index_(
     found.sort(key=lambda entry: (entry.start_time, entry.path))
     if json != "-":
         print_lines(console_for(), lines(found))
-    listed = [asdict(entry) for entry in found]
-    for entry in listed:
-        del entry["outline"]  # a thumbnail for the window
+    listed = [entry.as_json() for entry in found]
     write_result({"format": "dearig-index/1", "folder": str(folder), "recordings": listed}, json)

@@ -28,8 +28,8 @@ from dearig.cli.options import (
 )
 from dearig.cli.output import (
     check_files,
+    open_recordings,
     optional,
-    print_early_ends,
     print_line,
     working,
     write_result,
@@ -200,10 +200,10 @@ def identify(
     given = (*train, *(validate_ or []), rig_file, effects_of)
     check_files(force, given, out, *optional(report), json=json)
     with working(json) as (console, progress):
-        print_early_ends(console, [*train, *(validate_ or [])], ended_early.value)
+        fitted, others = open_recordings(console, train, validate_ or [], ended_early.value)
         outcome = identify_recordings(
-            train,
-            validation=validate_ or [],
+            fitted,
+            validation=others,
             method=method.value,
             branches=numbers,
             spring=spring.value,
@@ -328,16 +328,16 @@ def diagnose(
         result_folder(out, force)
         report, model_out = report or out / "report.html", model_out or out / "model.toml"
     with working(json, whole=True) as (console, progress):
-        print_early_ends(console, [*given, *others], ended_early.value)
+        fitted, untouched = open_recordings(console, given, others, ended_early.value)
         if rig is None:
             outcome = diagnose_recordings(
-                given, validation=others, branches=branches, spring=spring.value,
+                fitted, validation=untouched, branches=branches, spring=spring.value,
                 branch_spring=of_branches, drive=drive.value, rig_file=settings,
                 thorough=thorough, ended_early=ended_early.value, progress=progress,
             )  # fmt: skip
         else:
             outcome = diagnose_rig(
-                rig, out, experiments=experiments, train=given, validation=others,
+                rig, out, experiments=experiments, train=fitted, validation=untouched,
                 branches=branches, spring=spring.value, branch_spring=of_branches,
                 drive=drive.value, rig_file=settings,
                 configuration="" if rig_file is None else read_text(rig_file, "rig file"),

@@ -16,11 +16,13 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from dearig.progress import Progress
+    from dearig.recording.reading.recording import Recording
 
 __all__ = [
     "announce_compilation",
     "check_files",
     "console_for",
+    "open_recordings",
     "optional",
     "print_line",
     "print_lines",
@@ -92,11 +94,18 @@ def print_lines(console: Console, texts: Iterable[str], style: str | None = None
     console.print(text, style=style, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
 
-def print_early_ends(console: Console, sources: Sequence[Path], choice: str) -> None:
-    """Warn of recordings whose runs ended early, before they are used as they are."""
-    from dearig.analysis.readings.early_ends import early_end_warnings
+def open_recordings(
+    console: Console, train: Sequence[Path], validation: Sequence[Path], ended_early: str
+) -> tuple[list[Recording], list[Recording]]:
+    """Return the recordings at ``train`` and ``validation``; warn of runs that ended early.
 
-    found = early_end_warnings(sources) if choice == "keep" else ()
+    The warning comes before they are used as they are.
+    """
+    from dearig.analysis.readings.early_ends import early_end_warnings
+    from dearig.analysis.readings.opening import open_all
+
+    fitted, others = open_all(train), open_all(validation)
+    found = early_end_warnings([*fitted, *others]) if ended_early == "keep" else ()
     if found:
         print_lines(console, [f"Warning: {said}" for said in found], "yellow")
         print_line(
@@ -104,6 +113,7 @@ def print_early_ends(console: Console, sources: Sequence[Path], choice: str) -> 
             "Use --ended-early cut to leave out such an end, or --ended-early leave-out to leave "
             "out the recording.",
         )
+    return fitted, others
 
 
 @contextmanager

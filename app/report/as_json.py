@@ -235,6 +235,8 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "residual_before": {s.record: _signature_json(s, outcome.kind) for s in finding.before},
         "verdict": outcome.verdict,
         "verdict_reasons": list(outcome.judgement.reasons),
+        "recommended": "final" if outcome.recommends_final else "baseline",
+        "validation_gain": _number(outcome.gain),
         "status": outcome.status,
         "events": [
             {
@@ -247,7 +249,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             for c in (*after.train, *after.validation)
             for e in c.events
         ],
-        "families": [{"family": f, "probability": p} for f, p in finding.families],
+        "families": [{"family": f, "probability": p} for f, p in outcome.families],
         "unnamed": None
         if finding.unnamed is None
         else {

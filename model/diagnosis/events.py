@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,12 +44,14 @@ class Own:
     """What is a recording's own: its ``events``, and whether its reading ``drifts``.
 
     ``rms`` is the model's error in m without them, and without the slow part of a noise that is
-    coloured: over a whole recording it is larger than at rest.
+    coloured: over a whole recording it is larger than at rest. ``signal`` (N,) in m is what they
+    add to the reading.
     """
 
     events: tuple[Event, ...]
     drifts: bool
     rms: float
+    signal: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False)
 
 
 def own_of(
@@ -72,8 +74,8 @@ def own_of(
     """
     response = model.simulate(record.drive, record.lag)
     if response.ok:
-        bare = without_spikes(record, record.displacement - record.seen(response.displacement))
-        record = bare if isinstance(bare, ActuatorRecord) else record
+        calm = without_spikes(record, record.displacement - record.seen(response.displacement))
+        record = calm if isinstance(calm, ActuatorRecord) else record
     settings = settings or DiagnosisSettings()
     fitter = Fitter([record], replace(model, effects=()), settings, 1, others=others)
     fitter.read_colour()
@@ -106,11 +108,14 @@ def own_of(
         found = dict(numbers[name])
         events.append(Event(name, found[moment.name], found[size.name], size.unit))
     whole = _as_it_is(fitter.careful_problem(best.model, best.drift))
+    bare = _as_it_is(fitter.careful_problem(model, 0.0)).plain_residuals()
     error, own = whole.plain_residuals(), whole.problem.noise_drift
     error = error - own.mean(error) if own and best.drift else error
     good = np.isfinite(whole.problem.sigma)
-    rms = fitter.full[0].noise * float(np.sqrt(np.mean(error[good] ** 2)))
-    return Own(tuple(sorted(events, key=lambda e: e.time)), best.drift > 0.0, rms)
+    noise = fitter.full[0].noise
+    rms = noise * float(np.sqrt(np.mean(error[good] ** 2)))
+    signal = noise * np.where(good, error - bare, 0.0)
+    return Own(tuple(sorted(events, key=lambda e: e.time)), best.drift > 0.0, rms, signal)
 
 
 def drifts_at_rest(

@@ -1,4 +1,4 @@
-"""How far a fitted model may be off on recordings that it was not fitted to, by its parameters."""
+"""How well a model predicts recordings that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.parameters import NORMAL_95, Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 
-__all__ = ["prediction_error"]
+__all__ = ["prediction_error", "prediction_gain"]
 
 
 def prediction_error(
@@ -39,3 +40,19 @@ def prediction_error(
     jacobian = problem.jacobian(x, free) * reach
     moved = jacobian @ (directions * lengths)
     return NORMAL_95 * record.noise * float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
+
+
+def prediction_gain(before: np.ndarray, after: np.ndarray, noise: float) -> float:
+    """Return how much more probable a recording is with a second model than with a first.
+
+    ``before`` and ``after`` (N,) are the residuals of the two models, NaN where a reading must not
+    be used, and ``noise`` is the floor of one reading. No parameter was fitted to the recording, so
+    that the gain is n ln(b/a): twice the logarithm of the likelihood ratio, with the scale of the
+    noise marginalised, b and a the mean squares, and n the readings over the shorter of the two
+    correlation times.
+    """
+    good = np.isfinite(before) & np.isfinite(after)
+    one, two = before[good], after[good]
+    independent = one.size / max(min(correlation_time(one), correlation_time(two)), 1.0)
+    b, a = (max(float(np.mean(r**2)), noise**2) for r in (one, two))
+    return float(independent * np.log(b / a))

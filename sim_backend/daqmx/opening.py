@@ -29,7 +29,7 @@ def open_device(
 ) -> SimulatedCard:
     """Return the card of the rig at ``address``; see ``factory.open_simulated_rig``.
 
-    With ``sine`` the inputs read a sine instead of the rig, see ``TimingEngine``. ``signals`` are
+    With ``sine`` the inputs read a sine instead of the rig, see ``SimulatedCard``. ``signals`` are
     at the card's digital terminals, see ``terminals``.
     """
     plant, hidden = plant_of(address, film, load)

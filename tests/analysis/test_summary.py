@@ -54,7 +54,7 @@ def summary(folder: Path, name: str) -> RecordingSummary:
 
 def test_a_summary_tells_what_a_recording_is(folder):
     found, recording = summary(folder, "low.h5"), open_recording(folder / "low.h5")
-    assert (found.name, found.title, found.film, found.operator) == (
+    assert (found.name, found.title, found.film, found.texts["operator"]) == (
         "low", "lobes of 4.0 kV", "film 1", "Ada",
     )  # fmt: skip
     assert (found.samples, found.duration) == (recording.samples, recording.duration)

@@ -16,7 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from dearig.analysis.readings.quality import extrapolated
+from dearig.analysis.readings.enough import extrapolated
+from dearig.analysis.readings.record import Readings
 from dearig.recording import open_recording
 from dearig.recording.reading.recording import Recording
 from tests.tools.command import done
@@ -61,7 +62,8 @@ def diagnosed(recordings: dict[str, Recording], train: tuple[str, ...]) -> Itera
         first, last = (
             stage["validation_by_record"][recording.name]["rms_kPa"] for stage in (before, after)
         )
-        yield f"{first:.2f} -> {last:.2f}{' *' if extrapolated(given, [recording]) else ''}"
+        beyond = extrapolated([*map(Readings, given)], [Readings(recording)])
+        yield f"{first:.2f} -> {last:.2f}{' *' if beyond else ''}"
     yield f"{found['seconds']:.0f}"
 
 

@@ -43,13 +43,13 @@ def make(shelf: Path, files: int) -> None:
 
 def trended(shelf: Path, cache: Path) -> int:
     """List the folder, filter its films, and trend a number of them; return how many they are."""
-    chosen = [e for e in index_folder(shelf, cache=cache) if e.film_id < "F10"]
+    chosen = [e for e in index_folder(shelf, cache=cache) if e.film < "F10"]
     random = np.random.default_rng(1)
     rows = [
         {
             "recording": e.path,
             "started": e.start_time,
-            "film": e.film_id,
+            "film": e.film,
             # copies have one peak: a reading of it differs
             "peak_displacement_mm": 1e3 * e.peaks["displacement"] * random.normal(1.0, 0.01),
             **e.room,

@@ -50,13 +50,13 @@ def card(name: str) -> SimulatedCard:
 def watch_lines(device: SimulatedCard) -> list[tuple[str, bool, float]]:
     """Return a list that gets every change of a digital line of ``device``."""
     changes: list[tuple[str, bool, float]] = []
-    put = device._wire.set_line
+    put = device.wire.set_line
 
     def put_and_note(line: str, level: bool, now: float) -> None:
         changes.append((line, level, now))
         put(line, level, now)
 
-    device._wire.set_line = put_and_note  # type: ignore[method-assign]
+    device.wire.set_line = put_and_note  # type: ignore[method-assign]
     return changes
 
 

@@ -120,7 +120,7 @@ def hours_of_a_server(hours: float) -> list[str]:
                 history.append(Kept.of(me))
                 row(
                     f"{(place + 1) * BLOCK / RATE / 3600:.2f} h", history[-1],
-                    len(card.device._tasks), len(card.server.clients.known),
+                    len(card.device.state.tasks), len(card.server.clients.known),
                     len(card.device.history()),
                 )  # fmt: skip
         ai.stop()

@@ -52,7 +52,7 @@ import numpy as np
 
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.diagnose import diagnose_recordings
-from dearig.analysis.readings.record import as_record
+from dearig.analysis.readings.record import Readings
 from dearig.analysis.track import track
 from dearig.analysis.track_target import limits_of, task_of
 from dearig.analysis.tracking import TrackedRun
@@ -417,7 +417,7 @@ def _by_family(seed: int, train: FilePath) -> tuple[ModelFile, ModelFile]:
     """Thesis's model and that with the best law of the hidden families, both fitted."""
     case = drawn(seed)
     bare = Actuator(case.film, case.load, case.network)
-    records = [as_record(open_recording(train))]
+    records = [Readings(open_recording(train)).record]
     _, thesis = _fitted(bare, records)
     laws = [
         name

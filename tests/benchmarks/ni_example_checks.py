@@ -39,7 +39,7 @@ class Played:
 
     def edges(self, terminal: str, rising: bool = True) -> np.ndarray:
         """Return the times of the edges on a terminal up to now, in s."""
-        return self.device.terminals.signal(terminal).edges(-1.0, self.device._now(), rising)
+        return self.device.terminals.signal(terminal).edges(-1.0, self.device.state.now(), rising)
 
     def rises(self, line: str) -> np.ndarray:
         """Return when a digital line went from low to high, in s."""

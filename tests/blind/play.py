@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from dearig.acquisition.run import RunOptions, record
-from dearig.analysis.readings.record import as_record
+from dearig.analysis.readings.record import Readings
 from dearig.config.rigfile import load_rig_file
 from dearig.config.sequencefile import load_sequence
 from dearig.config.toml_input import read_text
@@ -232,7 +232,7 @@ class Bench:
 
 def records_of(paths: Sequence[Path]) -> list[ActuatorRecord]:
     """Records of actuators at ``paths``, as a fit takes them."""
-    records = [as_record(open_recording(path)) for path in paths]
+    records = [Readings(open_recording(path)).record for path in paths]
     return [r for r in records if isinstance(r, ActuatorRecord)]
 
 

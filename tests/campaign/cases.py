@@ -25,9 +25,9 @@ from dearig.drivers.settings import LaserSettings
 from dearig.errors import DearigError
 from dearig.recording import open_recording
 from dearig.sim_backend.clock import PacedClock
-from dearig.sim_backend.daqmx.card.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
 from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.keyence import SimulatedController
 from dearig.sim_backend.serial_port import serve_on_socket
@@ -281,7 +281,7 @@ def _observe(
     seed: int,
     moment: float,
     run: Run,
-    device: Device,
+    device: SimulatedCard,
     clock: PacedClock,
     patience: float,
 ) -> Outcome:
@@ -387,7 +387,7 @@ def _recording_faults(kind: str, expected: Expected, moment: float, run: Run) ->
     return wrong
 
 
-def _started(run: subprocess.Popen[str], device: Device) -> float:
+def _started(run: subprocess.Popen[str], device: SimulatedCard) -> float:
     """When the voltage rose first, on the card's clock."""
 
     def up() -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from dearig.analysis import diagnose as app_diagnose
+from dearig.analysis.readings.record import Readings
 from dearig.config.modelfile import load_model, save_model
 from dearig.config.sequencefile import parse_sequence
 from dearig.errors import DiskFault, InstrumentFault, Interrupted, NotSafe, SafetyStop
@@ -100,7 +101,7 @@ def diagnosed(bench: Path) -> dict:
 class TestRecordWithAModel:
     def test_the_rig_obeys_it(self, bench):
         recording = open_recording(bench / "thesis.h5")
-        drive = app_diagnose.as_record(recording).drive
+        drive = Readings(recording).voltage
         lag = recording.displacement_delay - recording.displacement_skew
         for model, close in ((HIDDEN, True), (replace(HIDDEN, effects=()), False)):
             said = model.simulate(drive, lag).displacement

@@ -30,7 +30,7 @@ def test_runs_on_a_card_leave_no_task_process_thread_or_file(tmp_path: Path) -> 
         def run(number: int) -> tuple[set[str], int]:
             out = tmp_path / f"run-{number}.h5"
             record(parse_sequence(LOBE, "the lobe", tmp_path), address, RIG, out)
-            assert card.device._tasks == {}
+            assert card.device.state.tasks == {}
             assert set(me.children(recursive=True)) <= others
             # what belongs to the server grows up to its pool
             own = {t.name for t in threading.enumerate() if not t.name.startswith("daqmx")}

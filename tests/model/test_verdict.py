@@ -9,7 +9,9 @@ import pytest
 from dearig.model.verdict import (
     BUDGET,
     COMPLETE,
+    CONFIRMING,
     EXPLAINED,
+    NOT_CONFIRMED,
     NOTHING_MISSING,
     PARTLY_EXPLAINED,
     STOPPED,
@@ -68,3 +70,20 @@ def test_nothing_is_not_missing_where_the_readings_move_at_rest():
     assert told == Judgement(PARTLY_EXPLAINED, ("rest",))
     # what was found may be what moves
     assert judge(EXPLAINED, COMPLETE, [1.0], [1.0], BETTER, True) == Judgement(EXPLAINED)
+
+
+@pytest.mark.parametrize("found", [EXPLAINED, PARTLY_EXPLAINED])
+@pytest.mark.parametrize("gain", [-math.inf, -300.0, 0.0, 0.99 * CONFIRMING])
+def test_what_untouched_recordings_do_not_confirm_is_not_confirmed(found, gain):
+    told = judge(found, COMPLETE, [1.0], [1.0, 6.2], BETTER, gain=gain)
+    assert told == Judgement(NOT_CONFIRMED, ("prediction",))
+
+
+def test_a_better_prediction_that_is_not_yet_noise_is_a_part():
+    assert judge(EXPLAINED, COMPLETE, [1.0], [6.2], BETTER, gain=CONFIRMING).reasons == (
+        "validation",
+    )
+    # at the noise, recordings that do not excite the effect deny nothing
+    assert judge(EXPLAINED, COMPLETE, [1.0], [1.1], BETTER, gain=0.0).verdict == EXPLAINED
+    # where nothing was added nothing can be confirmed
+    assert judge(NOTHING_MISSING, COMPLETE, [1.0], [6.2], BETTER).verdict == PARTLY_EXPLAINED

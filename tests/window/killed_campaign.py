@@ -32,9 +32,9 @@ from dearig.batch.watching import seen
 from dearig.config.rigfile import load_rig_file
 from dearig.recording import open_recording
 from dearig.sim_backend.clock import PacedClock
-from dearig.sim_backend.daqmx.card.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
 from dearig.sim_backend.daqmx.protocol.server import DaqmxServer
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.session.state import Session
@@ -201,7 +201,11 @@ def until_started(window: subprocess.Popen[str]) -> None:
 
 
 def kill_at_voltage(
-    folder: Path, device: Device, clock: PacedClock, window: subprocess.Popen[str], moment: float
+    folder: Path,
+    device: SimulatedCard,
+    clock: PacedClock,
+    window: subprocess.Popen[str],
+    moment: float,
 ) -> str:
     """Kill ``window`` so many s after the next rise of the voltage; return what was seen."""
     journal = folder / "campaign-1" / JOURNAL

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields
 
-from dearig.analysis.readings.quality import overlap
+from dearig.analysis.readings.enough import overlap
 from dearig.config.rigfile import FilmSection, LoadSection, RigFile
 from dearig.errors import InputError
 from dearig.model.errors import ModelError

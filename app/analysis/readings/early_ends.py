@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dearig.analysis.readings.record import Source
 from dearig.errors import InputError
 from dearig.recording.reading.early_end import cut_end, early_end
-from dearig.recording.reading.reader import open_recording
 from dearig.recording.reading.recording import Recording
 
 __all__ = ["CHOICES", "choose", "early_end_warnings"]
@@ -41,15 +39,7 @@ def choose(recordings: Sequence[Recording], choice: str) -> tuple[list[Recording
     return used, said
 
 
-def early_end_warnings(sources: Sequence[Source]) -> tuple[str, ...]:
-    """Return a sentence on each recording whose run ended early.
-
-    Raises ``InputError`` for one that cannot be read.
-    """
-    said = []
-    for source in sources:
-        recording = source if isinstance(source, Recording) else open_recording(source)
-        end = early_end(recording)
-        if end is not None:
-            said.append(f"{recording.name} {end.sentence}")
-    return tuple(said)
+def early_end_warnings(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Return a sentence on each recording whose run ended early."""
+    ended = ((recording.name, early_end(recording)) for recording in recordings)
+    return tuple(f"{name} {end.sentence}" for name, end in ended if end is not None)

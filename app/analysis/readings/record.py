@@ -1,147 +1,167 @@
-"""Records that a fit takes, made from recordings, and comparisons of recordings with a model."""
+"""Readings of a recording: what it measured, checked, with its noise, ready to fit."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache
-from pathlib import Path
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-import scipy  # loads its parts when they are first used, which a run may never do
 
-from dearig.analysis.outcomes import Comparison, Published
-from dearig.analysis.readings.quality import driven_by, inspect, spikes_about
-from dearig.config.presets import PRESETS, VALIDATION_A, VALIDATION_B
-from dearig.config.sequencefile import parse_sequence
+from dearig.analysis.readings.early_ends import choose
+from dearig.analysis.readings.opening import Source, open_all
+from dearig.analysis.readings.quality import Quality, check_driven, driven_by, inspect
+from dearig.analysis.readings.room import moisture_of, warmth_of
 from dearig.errors import InputError
-from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.readings.denoise import reading_noise, smoothed
-from dearig.model.readings.environment import CELSIUS, HUMIDITY, air_texts
-from dearig.model.readings.measures import errors
 from dearig.model.readings.noise import LEAD_IN, require_readings, rest_of_rounded, slow_at_rest
-from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, counted, interpolated
-from dearig.model.simulation.actuator import Actuator, Drive
-from dearig.model.simulation.excitation import Lobes
-from dearig.model.simulation.strip import Strip
-from dearig.recording.content.layout import SIGNALS
-from dearig.recording.content.physical import resolution
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, interpolated
+from dearig.model.simulation.actuator import Drive
 from dearig.recording.content.rest_noise import MIN_QUIET, ReadingNoise
-from dearig.recording.reading.early_end import early_end
-from dearig.recording.reading.origin import origin_of
-from dearig.recording.reading.reader import open_recording
 from dearig.recording.reading.recording import Recording
 
-__all__ = [
-    "PUBLISHED_FIT",
-    "Source",
-    "air_texts_of",
-    "as_record",
-    "check_named_once",
-    "compare",
-    "noise_texts",
-    "open_all",
-    "reading_noise_of",
-    "recording_drive",
-    "room_texts",
-]
-
-#: A recording that was opened, or the path of one.
-Source = str | Path | Recording
-
-#: The thesis's printed errors of its identification run.
-PUBLISHED_FIT = Published(2.13, 4.07)
-
-# Tables 4 and 5 of the thesis, by preset: e_rms and e_m in per cent, as printed
-_TABLE_4 = dict(
-    zip(
-        VALIDATION_A,
-        ((5.8484, 6.9696), (8.8924, 2.4462), (5.8952, 3.8678), (8.7797, 5.8924), (5.9604, 3.8877)),
-        strict=True,
-    )
-)
-_TABLE_5 = dict(
-    zip(
-        VALIDATION_B,
-        ((2.4729, 7.4374), (2.9408, 6.7550), (3.5766, 7.0148), (7.7592, 5.6113), (8.6652, 4.6098)),
-        strict=True,
-    )
-)
+__all__ = ["Readings", "noise_texts", "read_all", "recordings_of"]
 
 
-def open_all(sources: Sequence[Source]) -> list[Recording]:
-    """Return the recordings ``sources``, all of one kind; those given by path are opened.
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings of an open ``recording`` whose film is driven by ``drive``, command or monitor.
 
-    Raises ``InputError`` for one that cannot be read, for a mixture of kinds, and for a file given
-    twice or together with a copy of it (its samples would count double).
+    A function that is given paths makes them once, by ``read_all``, and passes them on. Each
+    property is computed on first use and kept; it raises ``InputError`` for a recording that cannot
+    be used for it. ``is_held``: the voltage is held between the samples, also where the recording
+    does not say so.
     """
-    named: set[Path] = set()
-    for source in sources:
-        path = _path(source)
-        where = Path(os.path.realpath(path))
-        if where in named:
-            raise InputError(f"{path} is given twice; give each recording once")
-        named.add(where)
-    recordings = [s if isinstance(s, Recording) else open_recording(s) for s in sources]
-    seen: dict[str, Path] = {}
-    for recording in recordings:
-        if recording.sha256 in seen:
-            raise InputError(
-                f"{recording.path} is a copy of {seen[recording.sha256]}; leave one of them out"
-            )
-        seen[recording.sha256] = recording.path
-    kinds = {r.kind for r in recordings}
-    if len(kinds) > 1:
-        words = ", ".join(f"{r.path} is of {_KIND_WORDS[r.kind]}" for r in recordings)
-        raise InputError(f"these recordings cannot be used together: {words}")
-    return recordings
 
+    recording: Recording
+    drive: str = "command"
+    is_held: bool = False
 
-def check_named_once(train: Sequence[Source], validation: Sequence[Source]) -> None:
-    """Refuse a file that is given both to fit and to validate."""
-    named = {os.path.realpath(_path(source)) for source in train}
-    for source in validation:
-        if os.path.realpath(_path(source)) in named:
-            raise InputError(
-                f"{_path(source)} is given both to fit and to validate: an error on fitted data "
-                f"proves nothing; leave it out of one of them"
-            )
+    @property
+    def name(self) -> str:
+        """Name of the recording."""
+        return self.recording.name
 
+    @property
+    def kind(self) -> str:
+        """``actuator`` or ``film``."""
+        return self.recording.kind
 
-def _path(source: Source) -> Path:
-    return source.path if isinstance(source, Recording) else Path(source)
+    @property
+    def moved_by(self) -> np.ndarray | None:
+        """Drive (N,) of the film: the stretch, or the commanded or monitored voltage in V."""
+        return driven_by(self.recording, self.drive)
 
+    @cached_property
+    def quality(self) -> Quality:
+        """Which readings can be used, and sentences on the others."""
+        return inspect(self.recording, self.moved_by)
 
-_THERMOMETER = 1.0  # s over which a temperature is averaged: films do not warm faster
+    @cached_property
+    def noise(self) -> ReadingNoise | None:
+        """Noise of the readings that can be used, from the lead-in where there is one.
 
-_KIND_WORDS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
+        None where no reading differs from its neighbours.
+        """
+        valid = self.quality.valid
+        return self.recording.noise if valid is None else self.recording.noise_of_valid(valid)
 
+    @cached_property
+    def displacement(self) -> np.ndarray:
+        """Displacement (N,) in m from the rest state.
 
-def as_record(recording: Recording, drive: str = "command") -> Record:
-    """Return the record that a fit takes; ``drive`` is command or monitor, for actuators.
+        Its zero is the mean of the lead-in; that of coarse readings, which rounding shifts, is the
+        most probable one.
+        """
+        recording = self.recording
+        displacement, noise = _present(recording.displacement), recording.noise
+        if noise is None or not noise.step or not self.lead_in:
+            return displacement
+        at_rest = displacement[: recording.quiet_samples]
+        return displacement - rest_of_rounded(at_rest, noise.step, noise.value)
 
-    The noise is that of ``reading_noise_of``. Readings that must not be used (see
-    ``dearig.analysis.readings.quality``) are masked, and replaced by a line across them. Coarse
-    readings at rest are masked as well: all of them are rounded alike, so they say no more than
-    their zero.
-    """
-    try:
+    @property
+    def lead_in(self) -> int:
+        """Samples whose mean is the zero of displacement; 0 if they are too few for it."""
+        quiet = self.recording.quiet_samples
+        return quiet if quiet >= MIN_QUIET else 0
+
+    @property
+    def lag(self) -> float:
+        """Time in s from the film's motion to its reading."""
+        return self.recording.displacement_delay - self.recording.displacement_skew
+
+    @cached_property
+    def voltage(self) -> Drive:
+        """Voltage that drives the model: the command, or the monitor's reading.
+
+        A voltage that was read is smoothed to remove the reading's noise. The air of the room is
+        included where it was recorded: its temperature and humidity above those of the first
+        second, as means over a second, and those of the first second.
+        """
+        recording = self.recording
+        voltage = self.moved_by
+        warmth, temperature = warmth_of(recording)
+        moisture, humidity = moisture_of(recording)
+        try:
+            volts = _present(voltage)
+            noise = reading_noise(volts)
+            if noise > 0.0:
+                volts = smoothed(volts, noise)
+            hold = self.is_held or recording.hold
+            return Drive(recording.time, volts, hold, warmth, moisture, temperature, humidity)
+        except ModelError as error:
+            raise InputError(f"{recording.path}: {error}") from error
+
+    @cached_property
+    def record(self) -> Record:
+        """The record that a fit takes.
+
+        Readings that must not be used are masked, and replaced by a line across them. Coarse
+        readings at rest are masked as well: all of them are rounded alike, so they say no more than
+        their zero.
+        """
+        try:
+            return self._record()
+        except ModelError as error:
+            raise InputError(f"{self.recording.path}: {error}") from error
+
+    def check_driven(self) -> None:
+        """Refuse readings under a drive that never changes, to which nothing can be fitted."""
+        check_driven(self.recording, self.moved_by)
+
+    def known_noise(self) -> ReadingNoise:
+        """Return ``noise``.
+
+        Raises ``ModelError`` for too few readings, and where none differs from its neighbours.
+        """
+        return _known(self.recording, self.noise)
+
+    def held(self) -> Readings:
+        """Return the same readings under a voltage that is held between the samples."""
+        held = replace(self, is_held=True)
+        # what was found of the samples does not depend on the voltage between them
+        found = {name: value for name, value in vars(self).items() if name in _OF_SAMPLES}
+        vars(held).update(found)
+        return held
+
+    def _record(self) -> Record:
+        recording = self.recording
         if recording.kind == "film":
             stretch, stress = _present(recording.stretch), _present(recording.nominal_stress)
-            reading_noise_of(recording, None)  # refuses one that never changes
-            valid = inspect(recording, drive).valid
-            noise = reading_noise_of(recording, valid)
+            _known(recording, recording.noise)  # refuses one that never changes
+            self.check_driven()
+            valid, noise = self.quality.valid, self.known_noise()
             stress = interpolated(recording.time, stress, valid)
             return FilmRecord(recording.name, recording.time, stretch, stress, noise.value, valid)
-        displacement = _from_rest(recording)
-        reading_noise_of(recording, None)
-        driven = recording_drive(recording, drive)
-        valid = inspect(recording, drive).valid
+        displacement = self.displacement
+        _known(recording, recording.noise)
+        driven = self.voltage
+        self.check_driven()
+        valid, noise = self.quality.valid, self.known_noise()
         displacement = interpolated(recording.time, displacement, valid)
-        noise = reading_noise_of(recording, valid)
         if noise.step:
             valid = ~recording.quiet if valid is None else valid & ~recording.quiet
         return ActuatorRecord(
@@ -149,45 +169,52 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
             driven,
             displacement,
             noise.value,
-            recording.displacement_delay - recording.displacement_skew,
+            self.lag,
             valid,
-            _lead_in(recording),
+            self.lead_in,
             lag_error=recording.displacement_delay_error,
             rounding=noise.step / math.sqrt(12.0),
         )
-    except ModelError as error:
-        raise InputError(f"{recording.path}: {error}") from error
 
 
-def reading_noise_of(recording: Recording, valid: np.ndarray | None) -> ReadingNoise:
-    """Return the noise of the ``valid`` (N,) readings, from the lead-in where there is one.
+#: Properties of ``Readings`` that depend on the samples alone, not on what is between them.
+_OF_SAMPLES = ("quality", "noise", "displacement")
 
-    Raises ``ModelError`` for too few readings, and where none differs from its neighbours.
+
+def read_all(
+    sources: Sequence[Source | Readings], drive: str = "command", ended_early: str = "keep"
+) -> tuple[list[Readings], list[str]]:
+    """Return the readings of ``sources``, and a sentence on each recording that is left out.
+
+    Recordings that are given by path are opened; readings that were made before are used as they
+    are. ``ended_early`` is keep, cut or leave-out: what is done with recordings whose runs ended
+    early. Raises ``InputError`` for those that ``open_all`` refuses.
     """
-    require_readings(recording.signal)
-    noise = recording.noise if valid is None else recording.noise_of_valid(valid)
-    if noise is None:
-        raise ModelError(
-            "the signal never changes, or on a straight line only: check that "
-            "the sensor was connected and that the right column was imported"
-        )
-    return noise
+    made = {id(s.recording): s for s in sources if isinstance(s, Readings)}
+    opened = open_all([s.recording if isinstance(s, Readings) else s for s in sources])
+    used, said = choose(opened, ended_early)
+    return [made.get(id(recording)) or Readings(recording, drive) for recording in used], said
 
 
-def noise_texts(recordings: Iterable[Recording]) -> list[str]:
+def recordings_of(readings: Iterable[Readings]) -> list[Recording]:
+    """Return the recordings of ``readings``."""
+    return [each.recording for each in readings]
+
+
+def noise_texts(readings: Iterable[Readings]) -> list[str]:
     """Return a sentence on each recording of an actuator whose noise is not simply that at rest.
 
     It is from no lead-in, or something moves there.
     """
     said = []
-    for recording in recordings:
+    for recording in (each.recording for each in readings):
         noise = recording.noise
         if recording.kind != "actuator" or noise is None:
             continue
         if noise.source == LEAD_IN:
             at_rest = slice(0, recording.quiet_samples)
-            readings = _present(recording.displacement)[at_rest]
-            slow = slow_at_rest(recording.time[at_rest], readings, noise.value)
+            rest = _present(recording.displacement)[at_rest]
+            slow = slow_at_rest(recording.time[at_rest], rest, noise.value)
             if slow:
                 fast = math.sqrt(noise.value**2 - slow**2)
                 said.append(
@@ -204,253 +231,17 @@ def noise_texts(recordings: Iterable[Recording]) -> list[str]:
     return said
 
 
-def _from_rest(recording: Recording) -> np.ndarray:
-    """Return the displacement (N,) in m from the rest state.
-
-    Its zero is the mean of the lead-in; that of coarse readings, which rounding shifts, is the most
-    probable one.
-    """
-    displacement, noise = _present(recording.displacement), recording.noise
-    if noise is None or not noise.step or not _lead_in(recording):
-        return displacement
-    at_rest = displacement[: recording.quiet_samples]
-    return displacement - rest_of_rounded(at_rest, noise.step, noise.value)
-
-
-def _lead_in(recording: Recording) -> int:
-    """Return the samples whose mean is the zero of displacement; 0 if they are too few for it."""
-    return recording.quiet_samples if recording.quiet_samples >= MIN_QUIET else 0
-
-
-def recording_drive(recording: Recording, drive: str) -> Drive:
-    """Return the voltage of a recording: the command, or the monitor's reading.
-
-    A voltage that was read is smoothed to remove the reading's noise. The air of the room is
-    included where it was recorded: its temperature and humidity above those of the first second, as
-    means over a second, and those of the first second.
-    """
-    voltage = driven_by(recording, drive)
-    warmth, temperature = _air(recording, "temperature_degC", 1.0, CELSIUS)
-    moisture, humidity = _air(recording, "relative_humidity_percent", 0.01, HUMIDITY)
-    try:
-        volts = _present(voltage)
-        noise = reading_noise(volts)
-        if noise > 0.0:
-            volts = smoothed(volts, noise)
-        return Drive(recording.time, volts, recording.hold, warmth, moisture, temperature, humidity)
-    except ModelError as error:
-        raise InputError(f"{recording.path}: {error}") from error
-
-
-def _air(
-    recording: Recording, name: str, scale: float, reference: float
-) -> tuple[np.ndarray | None, float | None]:
-    """Return ``name`` of the room above that of the first second (N,), and that less a reference.
-
-    Each None where it was not recorded; ``scale`` makes the model's unit of the recording's.
-    """
-    values = recording.room(name)
-    if values is None:
-        return None, None
-    start = recording.time < recording.time[0] + _THERMOMETER
-    samples = max(int(np.count_nonzero(start)), 1)
-    first = float(values[start].mean())
-    changes = scipy.ndimage.uniform_filter1d(values, samples, mode="nearest") - first
-    return scale * changes, scale * first - reference
-
-
-def room_texts(recordings: Sequence[Recording]) -> list[str]:
-    """Return a sentence with the means of temperature and humidity; none where not recorded."""
-    parts = []
-    for name, unit in (("temperature_degC", "°C"), ("relative_humidity_percent", "%")):
-        means = [m for m in (getattr(r, name) for r in recordings) if m is not None]
-        if means:
-            ends = dict.fromkeys(f"{m:.1f}" for m in (min(means), max(means)))
-            parts.append(f"{' to '.join(ends)} {unit}")
-    return [f"the room was at {', '.join(parts)} (means of the recordings)"] if parts else []
-
-
-def air_texts_of(recordings: Sequence[Recording]) -> list[str]:
-    """Return why what films owe to the recorded air of the room cannot be looked for."""
-    driven = [r for r in recordings if r.kind == "actuator"]
-    return list(
-        air_texts(
-            [_air(r, "temperature_degC", 1.0, CELSIUS)[1] for r in driven],
-            [_air(r, "relative_humidity_percent", 0.01, HUMIDITY)[1] for r in driven],
+def _known(recording: Recording, noise: ReadingNoise | None) -> ReadingNoise:
+    require_readings(recording.signal)
+    if noise is None:
+        raise ModelError(
+            "the signal never changes, or on a straight line only: check that "
+            "the sensor was connected and that the right column was imported"
         )
-    )
+    return noise
 
 
 def _present(values: np.ndarray | None) -> np.ndarray:
     if values is None:
         raise ModelError("a channel that its kind needs is missing")
     return values
-
-
-def compare(
-    recording: Recording,
-    model: Actuator | Strip,
-    role: str,
-    drive: str = "command",
-    *,
-    hashed: bool = True,
-) -> Comparison:
-    """Compare the recording with the prediction of ``model``.
-
-    Not ``hashed`` leaves the hash of the file, which takes a second for each GB, out of the origin.
-    Readings that must not be used are NaN and do not count in the errors. Raises ``InputError``
-    where model and recording are not of one kind, or where the model cannot follow the drive.
-    """
-    look = inspect(recording, drive, to_fit=False)
-    warnings = list(look.findings)
-    signal = recording.signal if recording.kind == "film" else _from_rest(recording)
-    usable = np.ones(signal.size, dtype=bool) if look.valid is None else look.valid
-    if recording.kind == "film":
-        if isinstance(model, Actuator):
-            raise InputError(
-                f"{recording.path} is of a film (stretch), and the model is of an actuator "
-                f"(voltage): validate it on recordings of the actuator, or identify a film model"
-            )
-        if recording.kinematics != model.kinematics:
-            warnings.append(
-                f"the film was held {recording.kinematics}, the model's {model.kinematics}"
-            )
-        stretch = _present(recording.stretch)
-        answer = replace(model, kinematics=recording.kinematics).simulate(recording.time, stretch)
-        if not answer.ok:
-            raise InputError(f"{recording.path}: the model cannot follow it: {answer.in_words}")
-        try:
-            reading_noise_of(recording, look.valid)
-        except ModelError as error:
-            raise InputError(f"{recording.path}: {error}") from error
-        predicted, driven = answer.stress, stretch
-        table, row, published = "", "", None
-    else:
-        if not isinstance(model, Actuator):
-            raise InputError(
-                f"{recording.path} is of an actuator (voltage), and the model is of a bare film "
-                f"(stretch), which knows no load and no electrodes: validate it on recordings of "
-                f"films, or identify an actuator model"
-            )
-        warnings += _other_rig(recording, model)
-        drive_of = recording_drive(recording, drive)
-        warnings += _unknown_air(model, drive_of)
-        lag = recording.displacement_delay - recording.displacement_skew
-        response = model.simulate(drive_of, lag)
-        if not response.ok:
-            raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
-        predicted = counted(response.displacement, _lead_in(recording))
-        driven = drive_of.voltage
-        spiky, said = spikes_about(recording, signal - predicted, usable, driven**2)
-        usable = usable & ~spiky
-        warnings += said
-        table, row, published = _place(recording)
-    noise = recording.noise if look.valid is None else recording.noise_of_valid(look.valid)
-    ended = early_end(recording)
-    if ended is not None:
-        warnings.append(ended.sentence)
-    return Comparison(
-        name=recording.name,
-        kind=recording.kind,
-        role=role,
-        time=recording.time,
-        drive=driven,
-        measured=np.where(usable, signal, np.nan),
-        model=predicted,
-        errors=errors(signal[usable], predicted[usable]),
-        noise=noise.value if noise else None,
-        noise_source=noise.source if noise else LEAD_IN,
-        table=table,
-        row=row,
-        published=published,
-        warnings=tuple(warnings),
-        ended=ended,
-        quiet_count=noise.count if noise and noise.source == LEAD_IN else 0,
-        origin=origin_of(recording, hashed),
-        step=_converter_step(recording),
-    )
-
-
-#: Samples from which the step of imported values is read.
-_STEP_SAMPLES = 100_000
-#: Step as a share of the largest value, below which it is rounding; deviation from whole steps.
-_ROUNDING, _OFF_STEP = 1e-9, 0.02
-
-
-def _converter_step(recording: Recording) -> float:
-    """Return the step of the converter in the measured unit, 0.0 where none is known.
-
-    Imported values have no counts: theirs is the step of which all their differences are multiples.
-    """
-    for channel in recording.channels:
-        if channel.name == SIGNALS[recording.kind]:
-            return resolution(channel)
-    levels = np.unique(recording.signal[:_STEP_SAMPLES])
-    rises = np.diff(levels)
-    if rises.size < MIN_QUIET:
-        return 0.0
-    step = float(rises.min())
-    # a step of rounding errors, or one of which the others are no multiples, is none
-    off = np.abs(rises / step - np.round(rises / step))
-    is_even = step > _ROUNDING * float(np.abs(levels).max()) and float(off.max()) < _OFF_STEP
-    return step if is_even else 0.0
-
-
-def _unknown_air(model: Actuator, drive: Drive) -> list[str]:
-    """Return sentences on effects of the room whose air the recording does not have."""
-    sentences = []
-    for name, _ in model.effects:
-        needs = EFFECTS[name].needs
-        if needs == "humidity" and drive.humidity is None:
-            sentences.append(f"{name}: the humidity was not recorded, and is taken as 50 %")
-        elif needs == "temperatures" and drive.temperature is None:
-            sentences.append(f"{name}: the temperature was not recorded, and is taken as 23 °C")
-    return sentences
-
-
-def _other_rig(recording: Recording, model: Actuator) -> list[str]:
-    """Return sentences on a film or load of the recording that differs from the model's."""
-    sentences = []
-    if recording.film is not None and recording.film != model.film:
-        sentences.append("the recording was made with another film than the model's")
-    if recording.load is not None and recording.load.mass != model.load.mass:
-        sentences.append(
-            f"the recording was made under {recording.load.mass * 1e3:g} g, the model is of "
-            f"{model.load.mass * 1e3:g} g"
-        )
-    return sentences
-
-
-def _place(recording: Recording) -> tuple[str, str, Published | None]:
-    """Return table, row and printed errors of a run that the thesis made too."""
-    elsewhere = ("", recording.name, None)
-    if not recording.sequence_toml:
-        return elsewhere
-    try:
-        played = _lobes(recording.sequence_toml, recording.name)
-    except InputError:
-        return elsewhere  # a sequence with a CSV file that is missing: not one of the thesis's
-    return elsewhere if played is None else _thesis_runs().get(played, elsewhere)
-
-
-@cache
-def _thesis_runs() -> Mapping[Lobes, tuple[str, str, Published | None]]:
-    """Return table, row and printed errors of the thesis's runs, by one period of their lobes."""
-    places: dict[str, tuple[str, str, Published | None]] = {
-        "thesis": ("", "identification", PUBLISHED_FIT)
-    }
-    for preset, frequency in VALIDATION_A.items():
-        places[preset] = ("A", f"f = {frequency:g} Hz", Published(*_TABLE_4[preset]))
-    for preset, amplitude in VALIDATION_B.items():
-        places[preset] = ("B", f"a = {amplitude:g} kV", Published(*_TABLE_5[preset]))
-    runs = {_lobes(PRESETS[preset], preset): place for preset, place in places.items()}
-    return {lobes: place for lobes, place in runs.items() if lobes is not None}
-
-
-def _lobes(toml: str, name: str) -> Lobes | None:
-    """Return one period of a sequence of the thesis's lobes alone; None for any other."""
-    segments = parse_sequence(toml, name, Path()).sequence.segments
-    if len(segments) == 1 and isinstance(segments[0], Lobes):
-        # one period, so that runs of any length compare equal
-        return replace(segments[0], periods=1)
-    return None

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from dearig.model.errors import ModelError
 from dearig.model.film.specimen import KINEMATICS, Film, Load
+from dearig.recording.content.fields import TEXTS
 from dearig.recording.content.layout import FORMAT, ZERO_ORDER
 
 __all__ = ["Exported", "exported"]
@@ -16,10 +17,9 @@ __all__ = ["Exported", "exported"]
 #: Values of the provenance that an import keeps, and their types.
 _ORIGIN: dict[str, type] = {
     "simulated": bool,
-    "rig": str,
     "seed": int,
-    "operator": str,
     "model": str,
+    **{f.place.partition("/")[2]: str for f in TEXTS.values() if f.in_provenance},
 }
 
 T = TypeVar("T", Film, Load)
@@ -56,7 +56,7 @@ def exported(about: Mapping[str, str]) -> Exported:
 
 
 def _origin(text: str) -> dict[str, object]:
-    """Return rig, seed and operator, and whether the rig was simulated, as the export says."""
+    """Return the texts of the provenance, seed and model, and whether the rig was simulated."""
     try:
         found = json.loads(text) if text else {}
     except (ValueError, RecursionError):

@@ -2,34 +2,29 @@
 
 A thermo-hygrometer gives a reading every few seconds, at its own times. They are rows of a table of
 their own, and not repeated at the rate of the sample clock. An analog sensor at the card is a
-channel like any other: ``temperature``, or a declared one of the name ``HUMIDITY``.
+channel like any other, see ``CONDITIONS``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import h5py
 import numpy as np
 
-from dearig.drivers.channels import HUMIDITY
+from dearig.recording.content.fields import CONDITIONS
 from dearig.recording.content.layout import ENVIRONMENT_TYPE, make_own_scale
 from dearig.recording.content.safe import item
 from dearig.recording.reading.arrays import Overview
 
 __all__ = [
-    "MEANS",
     "Environment",
     "EnvironmentWriter",
     "mean_conditions",
     "read_environment",
     "stored_means",
 ]
-
-#: Attributes of /entry with the means of a run, and the channels that they are of otherwise.
-MEANS = MappingProxyType({"temperature_degC": "temperature", "relative_humidity_percent": HUMIDITY})
 
 _POINTS = 2000  # bins of a channel whose mean is taken: it changes slowly
 
@@ -54,14 +49,19 @@ class Environment:
             self.relative_humidity_percent[:kept],
         )  # fmt: skip
 
+    def of(self, name: str) -> np.ndarray | None:
+        """Return the readings (M,) of a condition; None for one that it does not measure."""
+        values: np.ndarray | None = getattr(self, name, None) if name in CONDITIONS else None
+        return values
+
     def at(self, name: str, time: np.ndarray) -> np.ndarray | None:
-        """Return the readings of ``name``, one of ``MEANS``, on a line between them, at ``time``.
+        """Return the readings of a condition on a line between them, at ``time``.
 
         (N,) s and (N,); None where there is no reading.
         """
-        values = getattr(self, name)
-        known = np.isfinite(values)
-        if not known.any():
+        values = self.of(name)
+        known = np.isfinite(values) if values is not None else np.zeros(0, dtype=bool)
+        if values is None or not known.any():
             return None
         return np.asarray(np.interp(time, self.time[known], values[known]))
 
@@ -108,19 +108,18 @@ def read_environment(entry: h5py.Group, rate: float) -> Environment | None:
 def mean_conditions(
     environment: Environment | None, channel: Callable[[str, int], Overview | None]
 ) -> dict[str, float]:
-    """Return the means of a run by the names in ``MEANS``; what is not known is left out.
+    """Return the means of a run by the keys of ``CONDITIONS``; what is not known is left out.
 
     ``channel`` returns the values of a channel in at most so many bins, None without that channel.
     A channel at the card counts before the thermo-hygrometer: it may be nearer to the film.
     """
     found = {}
-    for name, of in MEANS.items():
-        whole = channel(of, _POINTS)
+    for name, condition in CONDITIONS.items():
+        whole = channel(condition.channel, _POINTS)
+        values = None if environment is None else environment.of(name)
         if whole is not None:
             values = 0.5 * (whole.low + whole.high)
-        elif environment is not None:
-            values = getattr(environment, name)
-        else:
+        elif values is None:
             continue
         values = values[np.isfinite(values)]
         if values.size:
@@ -130,4 +129,4 @@ def mean_conditions(
 
 def stored_means(entry: h5py.Group) -> dict[str, float]:
     """Return the means that a finished run has as attributes of ``entry``."""
-    return {name: float(entry.attrs[name]) for name in MEANS if name in entry.attrs}
+    return {name: float(entry.attrs[name]) for name in CONDITIONS if name in entry.attrs}

@@ -17,6 +17,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.model.compiled.trusted_folder import cache_root
+from dearig.recording.content.fields import CONDITIONS, TEXTS, read_texts
 from dearig.recording.content.layout import FORMAT, SIGNALS, counts_name
 from dearig.recording.content.physical import SLICE, Counts, read_channels, sample_count
 from dearig.recording.content.pyramid import reduced
@@ -57,8 +58,8 @@ PEAKS = (
 OUTLINE = 40
 #: Events of a recording in the index, at most.
 EVENTS_MAX = 12
-#: Version of the cache; another one is not read.
-KEPT = "dearig-index/4"
+#: Version of the cache, with the fields that it holds; another one is not read.
+KEPT = f"dearig-index/5 {' '.join((*TEXTS, *CONDITIONS))}"
 
 
 @dataclass(frozen=True)
@@ -67,10 +68,10 @@ class Entry:
 
     ``peaks`` has the largest absolute value of each channel, with its sign, in the units of the
     layout; ``outline`` is the measured signal in ``OUTLINE`` bins, as hexadecimal bytes of least
-    and greatest value, of which 0 and 255 are the extremes. ``room`` has the means
-    ``temperature_degC`` and ``relative_humidity_percent``, where the recording has them. ``events``
-    are time in s, level and message of the first ``EVENTS_MAX`` events. ``identifier`` tells the
-    recording from every other.
+    and greatest value, of which 0 and 255 are the extremes. ``texts`` are those of
+    ``content.fields.TEXTS``; ``room`` has the means of its ``CONDITIONS``, where the recording has
+    them. ``events`` are time in s, level and message of the first ``EVENTS_MAX`` events.
+    ``identifier`` tells the recording from every other.
 
     ``trouble`` is the reason why it is not a recording, or "". ``passing``: the reason is one of
     the system, not of the file, which may be readable the next time.
@@ -85,10 +86,7 @@ class Entry:
     duration_s: float | None = None
     complete: bool = False
     outcome: str = ""
-    rig: str = ""
-    film_id: str = ""
-    operator: str = ""
-    notes: str = ""
+    texts: dict[str, str] = field(default_factory=dict)
     identifier: str = ""
     peaks: dict[str, float] = field(default_factory=dict)
     room: dict[str, float] = field(default_factory=dict)
@@ -96,6 +94,17 @@ class Entry:
     events: list[list[Any]] = field(default_factory=list)
     trouble: str = ""
     passing: bool = False
+
+    @property
+    def film(self) -> str:
+        """The operator's name for the film, "" without one."""
+        return self.texts.get("film_id", "")
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the entry for JSON, each text under its key, without the thumbnail."""
+        facts = asdict(self)
+        del facts["texts"], facts["outline"]
+        return facts | {key: self.texts.get(key, "") for key in TEXTS}
 
 
 #: Types of the facts in the cache.
@@ -107,6 +116,7 @@ _TYPES: Mapping[str, Any] = MappingProxyType(
         "duration_s": (int, float, NoneType),
         "complete": bool,
         "passing": bool,
+        "texts": dict,
         "peaks": dict,
         "room": dict,
         "events": list,
@@ -242,9 +252,6 @@ def _entry(path: Path, file: h5py.File, name: str, size: int) -> Entry:
         duration = max(samples - 1, 0) / float(rate)
     elif time is not None and time.shape[0]:
         duration = float(time[-1]) - float(time[0])
-    noted = group(entry, "provenance")
-    said = {} if noted is None else noted.attrs
-    sample = group(entry, "sample")
     complete = bool(facts.get("complete", False))
     kind = text_of(facts.get("kind", ""))
     for channel in data:
@@ -266,10 +273,7 @@ def _entry(path: Path, file: h5py.File, name: str, size: int) -> Entry:
         duration_s=duration,
         complete=complete,
         outcome=text_of(facts.get("outcome", "" if complete else "killed, or still running")),
-        rig=text_of(said.get("rig", "")),
-        film_id="" if sample is None else _text(sample, "name"),
-        operator=text_of(said.get("operator", "")),
-        notes="" if sample is None else _text(sample, "notes"),
+        texts=read_texts(entry),
         identifier=identifier_of(entry),
         peaks=peaks,
         room=stored_means(entry),
@@ -366,6 +370,8 @@ def _entry_from(facts: dict[str, Any]) -> Entry:
     for name, kind in _TYPES.items():
         if not isinstance(getattr(entry, name), kind):
             raise TypeError(f"{name} is {getattr(entry, name)!r}")
+    if not all(isinstance(text, str) for text in entry.texts.values()):
+        raise TypeError(f"texts are {entry.texts!r}")
     return entry
 
 
@@ -394,7 +400,8 @@ def lines(entries: Sequence[Entry]) -> list[str]:
             shown.append(f"{'not read':<25}  {'':>10}  {entry.path}: {entry.trouble}")
             continue
         length = "" if entry.duration_s is None else f"{entry.duration_s:.6g} s"
-        facts = [entry.title, *_peaks_text(entry), entry.rig, entry.film_id, entry.operator]
+        texts = [entry.texts.get(key, "") for key, field in TEXTS.items() if field.column]
+        facts = [entry.title, *_peaks_text(entry), *texts]
         if not entry.complete:
             facts.append(f"INCOMPLETE: {entry.outcome}")
         told = ", ".join(fact for fact in facts if fact)

@@ -11,6 +11,7 @@ from dearig.drivers.rig import Instrument
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.film.specimen import KINEMATICS, Film, Load
+from dearig.recording.content.fields import read_texts
 from dearig.recording.content.layout import (
     FORMAT,
     FORMAT_NAME,
@@ -150,8 +151,7 @@ class _Reader:
             voltage_step=step,
             film=film,
             load=load,
-            film_id=self._text(sample, "name"),
-            notes=self._text(sample, "notes"),
+            texts=read_texts(entry),
             sequence_toml=self._text(entry, "sequence"),
             model_toml=self._text(entry, "model"),
             outcome=text_of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +15,7 @@ from dearig.drivers.rig import Instrument
 from dearig.extras import import_extra
 from dearig.model.film.specimen import Film, Load
 from dearig.model.readings.noise import LEAD_IN
+from dearig.recording.content.fields import CONDITIONS
 from dearig.recording.content.layout import SIGNALS, UNITS, variable_attributes
 from dearig.recording.content.rest_noise import (
     MIN_QUIET,
@@ -23,7 +25,7 @@ from dearig.recording.content.rest_noise import (
 )
 from dearig.recording.files import file_sha256
 from dearig.recording.reading.arrays import Arrays, Overview
-from dearig.recording.reading.environment import MEANS, Environment, mean_conditions
+from dearig.recording.reading.environment import Environment, mean_conditions
 
 if TYPE_CHECKING:
     import pandas
@@ -60,7 +62,8 @@ class Recording:
     ``displacement_delay_error``; neither has been subtracted from ``time``. ``temperature`` is in
     degrees Celsius. ``complete`` is False for a run that was killed; ``outcome`` says how it ended.
     ``rate`` in Hz is that of the sample clock, None for data without one. ``environment`` are the
-    readings of a thermo-hygrometer, None for a run without one.
+    readings of a thermo-hygrometer, None for a run without one. ``texts`` has film, notes and
+    others by the keys of ``content.fields.TEXTS``.
     """
 
     path: Path
@@ -79,8 +82,7 @@ class Recording:
     voltage_step: float = 0.0
     film: Film | None = None
     load: Load | None = None
-    film_id: str = ""
-    notes: str = ""
+    texts: Mapping[str, str] = field(default_factory=dict)
     sequence_toml: str = ""
     model_toml: str = ""
     outcome: str = ""
@@ -90,6 +92,16 @@ class Recording:
     channels: tuple[Channel, ...] = ()
     provenance: dict[str, object] = field(default_factory=dict)
     environment: Environment | None = None
+
+    @property
+    def film_id(self) -> str:
+        """The operator's name for the film, "" without one."""
+        return self.texts.get("film_id", "")
+
+    @property
+    def notes(self) -> str:
+        """Notes of the operator."""
+        return self.texts.get("notes", "")
 
     @property
     def time(self) -> np.ndarray:
@@ -122,11 +134,11 @@ class Recording:
         return self._row("temperature")
 
     def room(self, name: str) -> np.ndarray | None:
-        """Return ``name``, a key of ``environment.MEANS``, over the time of the samples: (N,).
+        """Return ``name``, a key of ``CONDITIONS``, over the time of the samples: (N,).
 
         From a channel at the card, or else from the thermo-hygrometer; None where neither gave it.
         """
-        row = self._row(MEANS[name])
+        row = self._row(CONDITIONS[name].channel)
         if row is None and self.environment is not None:
             row = self.environment.at(name, self.time)
         return row
@@ -134,15 +146,17 @@ class Recording:
     @property
     def temperature_degC(self) -> float | None:  # noqa: N802
         """Mean temperature of the run in degrees Celsius; None where it is not known."""
-        return self._means.get("temperature_degC")
+        return self.conditions.get("temperature_degC")
 
     @property
     def relative_humidity_percent(self) -> float | None:
         """Mean relative humidity of the run in per cent; None where it is not known."""
-        return self._means.get("relative_humidity_percent")
+        return self.conditions.get("relative_humidity_percent")
 
     @cached_property
-    def _means(self) -> dict[str, float]:
+    def conditions(self) -> dict[str, float]:
+        """Means of the run by the keys of ``content.fields.CONDITIONS``, where they are known."""
+
         def channel(name: str, points: int) -> Overview | None:
             return self.overview(name, points) if name in self.arrays.names else None
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from dearig.recording.content.fields import CONDITIONS, TEXTS
 from dearig.recording.content.layout import FORMAT, LINEAR, ZERO_ORDER
 from dearig.recording.content.timestamps import local_time
-from dearig.recording.reading.environment import MEANS
 from dearig.recording.reading.recording import Recording
 
 __all__ = ["describe", "describe_rows"]
@@ -66,8 +66,7 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
         "noise_floor_m": noise.value if noise and recording.kind == "actuator" else None,
         "noise_floor_Pa": noise.value if noise and recording.kind == "film" else None,
         "noise_from": noise.source if noise else None,
-        "temperature_degC": recording.temperature_degC,
-        "relative_humidity_percent": recording.relative_humidity_percent,
+        **{name: recording.conditions.get(name) for name in CONDITIONS},
         "environment": _environment(recording),
         "rest_reading_m": recording.rest_reading,
         "displacement_skew_s": recording.displacement_skew,
@@ -75,7 +74,7 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
         "displacement_delay_error_s": recording.displacement_delay_error,
         "film": asdict(film) | {"id": recording.film_id} if film else None,
         "load": asdict(load) if load else None,
-        "notes": recording.notes,
+        **{key: recording.texts[key] for key, field in TEXTS.items() if not field.in_provenance},
         "sequence": recording.sequence_toml,
         "model": recording.model_toml,
         "instruments": [
@@ -98,26 +97,25 @@ def _environment(recording: Recording) -> dict[str, Any] | None:
     if readings is None:
         return None
     told: dict[str, Any] = {"readings": int(readings.sample.size)}
-    for name in MEANS:
-        values = getattr(readings, name)
-        known = values[np.isfinite(values)]
-        told[name] = [float(known.min()), float(known.max())] if known.size else None
+    for name in CONDITIONS:
+        values = readings.of(name)
+        if values is not None:
+            known = values[np.isfinite(values)]
+            told[name] = [float(known.min()), float(known.max())] if known.size else None
     return told
 
 
 def _room_row(environment: dict[str, Any]) -> str:
     """Return the ranges of a thermo-hygrometer's readings in words."""
     parts = []
-    for name, what, unit in (
-        ("temperature_degC", "temperature", "°C"),
-        ("relative_humidity_percent", "humidity", "%"),
-    ):
-        span = environment[name]
+    for name in (name for name in CONDITIONS if name in environment):
+        condition, span = CONDITIONS[name], environment[name]
+        what = condition.short or condition.label
         if span is None:
             parts.append(f"no {what}")
         else:
             ends = [f"{value:.1f}" for value in span]
-            parts.append(f"{what} {' to '.join(dict.fromkeys(ends))} {unit}")
+            parts.append(f"{what} {' to '.join(dict.fromkeys(ends))} {condition.unit}")
     count = environment["readings"]
     return f"{', '.join(parts)}; {count} reading{'s' if count > 1 else ''} of a thermo-hygrometer"
 
@@ -200,8 +198,12 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
     if load is not None:
         rest = "" if load.rest_length is None else f", at rest {load.rest_length * 1e3:.6g} mm"
         rows.append(("load", f"{load.mass * 1e3:.6g} g{rest}"))
-    if recording.notes:
-        rows.append(("notes", recording.notes))
+    # the film's name is in its row
+    rows += [
+        (field.label.lower(), recording.texts[key])
+        for key, field in TEXTS.items()
+        if not field.in_provenance and key != "film_id" and recording.texts[key]
+    ]
     feedback = str(recording.provenance.get("feedback", ""))
     if feedback:
         rows.append(("feedback", feedback.strip().replace(" = ", " ").replace("\n", "; ")))
@@ -210,8 +212,8 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
         parts += [f"{name} {value}" for name, value in instrument.settings]
         rows.append((instrument.role, "; ".join(parts)))
     rows += [(f"{event.level} at {event.time:.4g} s", event.message) for event in recording.events]
-    wanted = ("start_time", "operator", "host", "rig", "source", "seed", "dearig_version")
-    for name in (*wanted, "git_revision"):
+    listed = [field.place.partition("/")[2] for field in TEXTS.values() if field.in_provenance]
+    for name in ("start_time", *listed, "host", "source", "seed", "dearig_version", "git_revision"):
         value = recording.provenance.get(name)
         if value not in (None, ""):
             text = local_time(str(value)) if name == "start_time" else str(value)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
-from dearig.model.verdict import TOLERANCE
+from dearig.model.verdict import NOT_CONFIRMED, TOLERANCE
 from dearig.report.text.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
 from dearig.report.text.sentences import few_data_text, listed
 from dearig.report.text.tables import BOUND_MARK, Row, Table
@@ -45,6 +45,7 @@ HEADLINES = {
     "nothing_missing": "No missing effect found",
     "explained": "Residual explained",
     "partly_explained": "Residual partly explained",
+    "not_confirmed": "Not confirmed: explains the training recordings, does not help on others",
     "unexplained": "Residual not explained by any known effect",
 }
 _LOWERED = {
@@ -233,6 +234,14 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
             f"{_film_tolerance(outcome)}. It is not known whether an effect is missing: the search "
             f"was stopped before every effect was tried."
         )
+    if judgement.verdict == NOT_CONFIRMED:
+        best = "with" if outcome.recommends_final else "without"
+        return (
+            f"On the training recordings the thesis model fits better with {listed(names)}. On "
+            f"recordings that no fit used {_they(names)} not help by more than "
+            f"chance, so that no effect is named. The model to use, and the one that is written, "
+            f"is that {best} {_them(names)}."
+        )
     if judgement.reasons and not names:
         return "No effect improves the thesis model on the training recordings by more than chance."
     if judgement.reasons:
@@ -253,6 +262,10 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
     helps = "helps" if len(names) == 1 else "help"
     tried = f" {listed(names)} {helps}, but only a little." if names else ""
     return f"The residual is more than noise, and no known effect explains it.{tried}"
+
+
+def _they(names: list[str]) -> str:
+    return "it does" if len(names) == 1 else "they do"
 
 
 def _them(names: list[str]) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dearig.batch.studies import StudyTable
+from dearig.recording.content.fields import CONDITIONS
 from dearig.report.text.numbers import NO_VALUE, interval, quoted, significant
 from dearig.report.text.tables import Row, Table
 
@@ -19,8 +20,7 @@ _COLUMNS = (
     "mu_0_kPa",
     "rms_um",
     "rms_kPa",
-    "temperature_degC",
-    "relative_humidity_percent",
+    *CONDITIONS,
 )
 
 

@@ -24,6 +24,7 @@ from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from dearig.analysis.summary import RecordingSummary, how_it_ended, numbers
+from dearig.recording.content.fields import TEXTS
 from dearig.recording.content.timestamps import local_time
 from dearig.report.text.numbers import NO_VALUE, significant
 from dearig.units import SHOWN
@@ -79,6 +80,16 @@ def _number(
     return Column(head, tip, width, text, value, shown, number=True)
 
 
+def _text_column(key: str) -> Column:
+    def text(summary: RecordingSummary) -> str:
+        return " ".join(summary.texts.get(key, "").split())
+
+    field = TEXTS[key]
+    # 8 px a character, and 2 px beside them
+    width = 8 * field.characters + 2
+    return Column(field.label, field.tip, width, text, shown=field.shown, wide=field.wide)
+
+
 def _errors(summary: RecordingSummary) -> float | None:
     return None if summary.errors is None else summary.errors.rms
 
@@ -116,8 +127,7 @@ COLUMNS = (
     Column("Recording", "Path of the file in the folder, without its ending", 150,
            lambda s: s.name, lambda s: s.name.casefold(), wide=True),
     Column("Sequence", "Name of the sequence", 130, lambda s: s.title, wide=True),
-    Column("Film", "Name of the film", 104, lambda s: s.film, wide=True),
-    Column("Operator", "Operator of the run", 66, lambda s: s.operator),
+    *(_text_column(key) for key, field in TEXTS.items() if field.shown),
     Column("Start", "Start of the run: local time, with its offset from UTC", 178,
            lambda s: local_time(s.started), lambda s: s.started),
     Column("Duration", "Duration in s", 66, _seconds, lambda s: s.duration, number=True),
@@ -134,9 +144,7 @@ COLUMNS = (
     Column("How it ended", "How the run ended, and its events", 128, _ended, _severity, wide=True),
     Column("Tags", "Tags; select recordings and press Ctrl+T to change them", 84,
            lambda s: ", ".join(s.tags), wide=True),
-    Column("Notes", "Notes of the operator", 160, lambda s: " ".join(s.notes.split()), shown=False,
-           wide=True),
-    Column("Rig", "Address of the rig", 90, lambda s: s.rig, shown=False),
+    *(_text_column(key) for key, field in TEXTS.items() if not field.shown),
 )  # fmt: skip
 _HEADS = tuple(column.head for column in COLUMNS)
 _NAME, _START, _ENDED = (_HEADS.index(head) for head in ("Recording", "Start", "How it ended"))
@@ -345,10 +353,9 @@ def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
         return "\n".join([summary.outcome, *told])
     if COLUMNS[column].wide and head not in ("Recording", "Notes"):
         return f"{COLUMNS[column].name}: {COLUMNS[column].text(summary) or NO_VALUE}"
-    notes = f"\nNotes: {summary.notes}" if summary.notes else ""
-    by = f"\nOperator: {summary.operator}" if summary.operator else ""
-    tags = f"\nTags: {', '.join(summary.tags)}" if summary.tags else ""
-    return f"{path}{by}{notes}{tags}"
+    known = {field.label: summary.texts.get(key, "") for key, field in TEXTS.items()}
+    known["Tags"] = ", ".join(summary.tags)
+    return "\n".join([str(path), *(f"{label}: {text}" for label, text in known.items() if text)])
 
 
 class ThumbnailDelegate(QStyledItemDelegate):

@@ -69,6 +69,11 @@ class SharedTicks:
         self._pieces.append(_Piece(self.passed(now), generation, tick, row))
 
     @property
+    def start(self) -> float | None:
+        """Return None: it has no start of its own."""
+        return None
+
+    @property
     def rate(self) -> float:
         """Return the rate in Hz of the output on whose clock it started."""
         return self._pieces[0].generation.rate

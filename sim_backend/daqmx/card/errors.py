@@ -33,6 +33,7 @@ class Code(IntEnum):
     WRITE_BUFFER_TOO_SMALL = -200234
     SAMPLES_NEVER_AVAILABLE = -200278
     SAMPLES_OVERWRITTEN = -200279
+    NEGATIVE_SAMPLE = -200277
     SAMPLES_NOT_YET_AVAILABLE = -200284
     SAMPLES_NEVER_GENERATED = -200288
     OUTPUT_STARVED = -200290
@@ -61,6 +62,7 @@ class Code(IntEnum):
     CONVERT_PERIOD = -200081
     WRITE_WITHOUT_START = -200846
     READ_WITHOUT_START = -200834
+    READ_WITHOUT_COMMIT = -200473
     DONE_EVENT_REGISTERED = -200950
     SIGNAL_EVENT_REGISTERED = -200949
     SIGNAL_NOT_SUPPORTED = -200987
@@ -122,6 +124,7 @@ WORDS: dict[int, str] = {
     "available.",
     Code.SAMPLES_OVERWRITTEN: "The application is not able to keep up with the hardware "
     "acquisition: samples were overwritten in the buffer before they were read.",
+    Code.NEGATIVE_SAMPLE: "Attempted to read a sample before the first one that was acquired.",
     Code.SAMPLES_NOT_YET_AVAILABLE: "Some or all of the samples requested have not yet been "
     "acquired.",
     Code.SAMPLES_NEVER_GENERATED: "Some or all of the samples to write will never be generated.",
@@ -166,6 +169,8 @@ WORDS: dict[int, str] = {
     "the task is not running.",
     Code.READ_WITHOUT_START: "Read cannot be performed when the auto start property is false and "
     "the task is not running.",
+    Code.READ_WITHOUT_COMMIT: "Read cannot be performed when the auto start property is false and "
+    "the task is not running or committed.",
     Code.DONE_EVENT_REGISTERED: "Done event is already registered within this task.",
     Code.SIGNAL_EVENT_REGISTERED: "Signal event is already registered within this task.",
     Code.SIGNAL_NOT_SUPPORTED: "Signal event of this type is not supported by the channels or "

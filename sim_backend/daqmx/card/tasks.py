@@ -21,13 +21,15 @@ __all__ = [
     "CURRENT_WRITE",
     "DIGITAL_EDGE",
     "FALLING",
+    "FIRST_PRETRIGGER",
+    "FIRST_SAMPLE",
     "HIGH",
     "LINES_RATE",
     "LOW",
+    "MOST_RECENT",
     "NO_CHANGE",
     "NO_TRIGGER",
-    "READ_OFFSET",
-    "READ_RELATIVE_TO",
+    "REFERENCE_TRIGGER",
     "RISING",
     "TIMEBASE",
     "TRISTATE",
@@ -46,6 +48,7 @@ __all__ = [
     "State",
     "Task",
     "Watchdog",
+    "counted_on",
     "expanded",
     "physical_names",
 ]
@@ -55,8 +58,9 @@ RISING, FALLING = 10280, 10171  #: DAQmx: edges
 HIGH, LOW, TRISTATE, NO_CHANGE = 10192, 10214, 10310, 10160  #: DAQmx: levels of a line
 NO_TRIGGER, DIGITAL_EDGE, ANALOG_EDGE = 10230, 10150, 10099  #: DAQmx: types of a trigger
 CURRENT_READ, CURRENT_WRITE = 10425, 10430  #: DAQmx: reads and writes go on where they were
+FIRST_SAMPLE, MOST_RECENT = 10424, 10428  #: DAQmx: where a read begins
+REFERENCE_TRIGGER, FIRST_PRETRIGGER = 10426, 10427  #: DAQmx: where it begins with such a trigger
 #: Keys of properties that are kept, and refused when they would take effect.
-READ_RELATIVE_TO, READ_OFFSET = "read relative to", "read offset"
 WRITE_RELATIVE_TO, WRITE_OFFSET = "write relative to", "write offset"
 TIMEBASE = 1e8  #: Hz; the counters' timebase of 100 MHz
 LINES_RATE = 10e6  #: Hz; the fastest sample clock of the lines of port 0
@@ -281,7 +285,7 @@ class Task:
     outputs: list[AnalogOutput] = field(default_factory=list)
     lines: list[Lines] = field(default_factory=list)
     counters: list[CounterChannel | PulseChannel] = field(default_factory=list)
-    work: Work | None = None  # what it does, unless it is analog
+    work: Work | None = None  # what it does while it runs; None without channels
     watchdog: Watchdog | None = None
     timing: SampleClock = field(default_factory=lambda: SampleClock(1000.0, "", False, 1000))
     clocked: bool = False  # False: samples on demand
@@ -308,6 +312,7 @@ class Task:
     # of an output task
     waveform: Waveform | None = None
     first_write: int = 0  # samples; the buffer's size where none was set
+    pulses: list[Pulse] = field(default_factory=list)  # that were written to a counter
     generation: Generation | None = None
     # of an input task
     run: Run | None = None
@@ -315,6 +320,10 @@ class Task:
     ticks: Ticks | None = None
     delivered: int = 0
     by_read: bool = False  # True if a read started it
+    auto_start: bool = True  # True if a read may start it
+    read_from: int = CURRENT_READ  # DAQmx: what the first sample of a read is relative to
+    read_offset: int = 0  # samples from there
+    overwrites: bool = False  # True if unread samples may be overwritten
     read_available: bool = False  # True if a read of all takes what a finite task has by now
 
     def listens(self, owner: object) -> bool:
@@ -352,6 +361,11 @@ class Task:
         return self.timing if self.clocked else None
 
     @property
+    def sample_times(self) -> Ticks | None:
+        """Return the times of the samples of a running input; None for others."""
+        return self.ticks if self.work is None or self.ticks is not None else self.work.ticks
+
+    @property
     def wanted(self) -> int | None:
         """Return the samples after which a finite task is done; None for a continuous one."""
         if self.retriggers:
@@ -364,7 +378,10 @@ _LONGEST_RANGE = 64  # names
 
 
 def expanded(name: str) -> list[str]:
-    """Return the names in a range such as ``ai0:2`` or ``ai0:ai2``, or the name itself."""
+    """Return the names in a range such as ``ai0:2`` or ``ai0:ai2``, or the name itself.
+
+    Leading zeros of the first number give the width of all: ``in08:10`` is in08, in09, in10.
+    """
     found = _RANGE.match(name)
     if not found:
         return [name]
@@ -372,7 +389,21 @@ def expanded(name: str) -> list[str]:
     if abs(last - first) > _LONGEST_RANGE:
         raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {name}")
     step = 1 if last >= first else -1
-    return [f"{found[1]}{n}" for n in range(first, last + step, step)]
+    width = _width(found[2])
+    return [f"{found[1]}{n:0{width}d}" for n in range(first, last + step, step)]
+
+
+def _width(number: str) -> int:
+    """Return the width to which DAQmx fills the numbers of a range that begins at ``number``."""
+    return len(number) if number.startswith("0") and int(number) else 0
+
+
+def counted_on(name: str, count: int) -> list[str]:
+    """Return ``count`` names: DAQmx counts on from the number at the end of ``name``, or from 0."""
+    base = name.rstrip("0123456789")
+    number = name[len(base) :] or "0"
+    width, first = _width(number), int(number)
+    return [f"{base}{n:0{width}d}" for n in range(first, first + count)]
 
 
 def physical_names(text: str, device: str) -> list[str]:

@@ -13,8 +13,9 @@ from dearig.sim_backend.daqmx.card.signals import (
     parse_square_wave,
 )
 
-__all__ = ["COUNTERS", "DEFAULT_SIGNALS", "LINES", "PFI", "RTSI", "Terminals"]
+__all__ = ["COUNTERS", "DEFAULT_SIGNALS", "LINES", "ON_BOARD", "PFI", "RTSI", "Terminals"]
 
+ON_BOARD = "onboardclock"  #: the card's own clock, as the source of a task's
 COUNTERS = tuple(f"ctr{i}" for i in range(4))
 PFI = tuple(f"pfi{i}" for i in range(16))
 RTSI = tuple(f"rtsi{i}" for i in range(8))
@@ -127,6 +128,26 @@ class Terminals:
         if text.strip().startswith("/") and slash:
             raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {text}")
         return short
+
+    # sources of clocks and triggers, of which the card's own clock is one
+
+    def pin(self, text: str) -> str:
+        """Return a terminal such as ``/Dev1/PFI0`` without its device, in lower case, unchecked."""
+        short = text.strip().lower()
+        if short.startswith("/"):
+            owner, _, short = short[1:].partition("/")
+            if owner != self._device.lower():
+                raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {text}")
+        return short
+
+    def source(self, text: str) -> str:
+        """Return a terminal such as ``/Dev1/ao/SampleClock`` without its device, in lower case."""
+        return ON_BOARD if self.pin(text) == ON_BOARD else self.name(text)
+
+    def full_source(self, text: str) -> str:
+        """Return the full name of a source, such as ``/Dev1/PFI0`` for ``pfi0``."""
+        short = self.source(text)
+        return f"/{self._device}/OnboardClock" if short == ON_BOARD else self.full(short)
 
     # who drives what
 

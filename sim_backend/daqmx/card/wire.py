@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.drivers.settings import CardSettings
+from dearig.sim_backend.daqmx.card.acquisition import SharedTicks
 from dearig.sim_backend.daqmx.card.output import Generation, Track
+from dearig.sim_backend.daqmx.card.state import CardState
 from dearig.sim_backend.daqmx.card.wiring import Wiring
 
 __all__ = ["Change", "Wire"]
@@ -35,20 +36,17 @@ class Change:
 class Wire:
     """Outputs and digital lines of a card with ``wiring`` at its terminals.
 
-    Times are in s since ``born`` on the clock. ``client`` changed the wired output last.
+    ``client`` changed the wired output last. What no task of the card can read any more is
+    discarded.
     """
 
     def __init__(
-        self,
-        card: CardSettings,
-        wiring: Wiring,
-        outputs: Sequence[str],
-        lines: Sequence[str],
-        born: float,
+        self, state: CardState, wiring: Wiring, outputs: Sequence[str], lines: Sequence[str]
     ) -> None:
+        card = state.settings.card
+        self._state = state
         self._wired = card.ao_command
         self._wiring = wiring
-        self._born = born
         self._tracks = {terminal: Track() for terminal in outputs}
         self.levels = dict.fromkeys(lines, False)
         self._enable = card.do_hv_enable
@@ -126,12 +124,8 @@ class Wire:
         if self._enable is not None:
             self.set_line(self._enable, False, now)
 
-    def follow(self, now: float, oldest: Callable[[Generation], int]) -> None:
-        """Add the output up to ``now`` to the history.
-
-        ``oldest`` returns the first tick of a generation that a task may still read; earlier
-        samples are discarded.
-        """
+    def follow(self, now: float) -> None:
+        """Add the output up to ``now`` to the history."""
         if self._following is None:
             return
         generation, row = self._following
@@ -151,10 +145,31 @@ class Wire:
                 self._trace(generation.due(self._traced + int(at)), int(counts[at]))
             self._away = bool(away[-1])
             self._traced = last
-        generation.waveform.drop_before(max(0, min(self._traced - 1, oldest(generation))))
+        generation.waveform.drop_before(max(0, min(self._traced - 1, self._oldest(generation))))
 
-    def forget_before(self, time: float) -> None:
-        """Discard the outputs before ``time``."""
+    def _oldest(self, generation: Generation) -> int:
+        """Return the first tick of ``generation`` that a task may still read, or its last one."""
+        oldest = generation.waveform.written
+        for task in self._state.tasks.values():
+            if task.ticks is None or not task.running:
+                continue
+            keeps = task.run.keeps if task.run is not None else 0
+            if isinstance(task.ticks, SharedTicks):
+                needed = task.ticks.needs(generation, keeps)
+                if needed is not None:
+                    oldest = min(oldest, needed)
+            elif task.ticks.start is not None:
+                time = float(task.ticks.times(keeps, keeps + 1)[0])
+                oldest = min(oldest, math.floor((time - generation.start) * generation.rate) - 1)
+        return oldest
+
+    def forget(self, now: float) -> None:
+        """Discard the outputs before the earliest time that a task may still read."""
+        time = now
+        for task in self._state.tasks.values():
+            if task.ticks is not None and task.running and task.ticks.passed(now):
+                keeps = task.run.keeps if task.run is not None else 0
+                time = min(time, float(task.ticks.times(keeps, keeps + 1)[0]))
         for track in self._tracks.values():
             track.forget_before(time)
         while len(self._enabled) > 1 and self._enabled[1][0] <= time:
@@ -172,4 +187,4 @@ class Wire:
     def _trace(self, now: float, counts: int) -> None:
         output = self._wiring.output_volts(counts)
         wire = self._wiring.film_voltage(counts) if self._enabled[-1][1] else 0.0
-        self.history.append(Change(self._born + now, output, wire))
+        self.history.append(Change(self._state.born + now, output, wire))

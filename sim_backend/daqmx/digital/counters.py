@@ -13,7 +13,7 @@ from dearig.sim_backend.daqmx.card.signals import Signal
 from dearig.sim_backend.daqmx.card.tasks import RISING, TIMEBASE, CounterChannel, Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.triggers import AwaitedEdge, Edge, Pause, SampleTicks
-from dearig.sim_backend.daqmx.card.work import InputWork, Samples
+from dearig.sim_backend.daqmx.card.work import SampledInput, Samples
 
 __all__ = ["PULSES", "CounterInput", "Measure", "default_terminal"]
 
@@ -288,10 +288,10 @@ class _Intervals:
         return one.nth(self._seen, max(1, ahead), channel.edge == RISING)
 
 
-class CounterInput(InputWork):
+class CounterInput(SampledInput):
     """Measurement of the one channel of ``task`` on the signals at ``terminals``.
 
-    ``timing(task, now)`` makes the sample clock, ``room(task)`` is the buffer's size in samples,
+    ``timing(task, now)`` makes the sample clock, ``buffer_size(task)`` is in samples,
     ``pause(task)`` what stops the counting of edges, ``armed(task)`` the edge that arms it.
     """
 
@@ -301,7 +301,7 @@ class CounterInput(InputWork):
         channel: CounterChannel,
         terminals: Terminals,
         timing: Callable[[Task, float], SampleTicks],
-        room: Callable[[Task], int],
+        buffer_size: Callable[[Task], int],
         pause: Callable[[Task], Pause | None],
         armed: Callable[[Task], Edge | None],
     ) -> None:
@@ -309,7 +309,7 @@ class CounterInput(InputWork):
         self.channel = channel
         self._terminals = terminals
         self._timing = timing
-        self._room = room
+        self._buffer_size = buffer_size
         self._pause = pause
         self._armed = armed
         self._counting = _Counting(channel, self._signal)
@@ -325,6 +325,11 @@ class CounterInput(InputWork):
         """Return True for a value that exists at any time; others come with edges."""
         return self.channel.measure == Measure.COUNT_EDGES or self.channel.measure in _ENCODERS
 
+    @property
+    def may_be_implicit(self) -> bool:  # type: ignore[override]
+        """Return True for a value that comes with the edges of the signal."""
+        return not self.counts
+
     def _signal(self, role: str) -> Signal:
         return self._terminals.signal(self.channel.terminals[role])
 
@@ -338,7 +343,7 @@ class CounterInput(InputWork):
         clock = self.task.clock
         if clock is not None:
             rows = 2 if self.channel.measure in PULSES else 1
-            self.samples = Samples(rows, self._room(self.task), np.float64)
+            self.samples = Samples(rows, self._buffer_size(self.task), np.float64)
             if not clock.implicit:
                 self.ticks = self._timing(self.task, now)
         if edge is None:
@@ -354,7 +359,7 @@ class CounterInput(InputWork):
         self._running = False
         self._waits.begin(None, now)
 
-    def settle(self, now: float) -> None:
+    def watch(self, now: float) -> None:
         at = self._waits.passed(now)
         if at is not None:
             self._begin(at)
@@ -362,7 +367,9 @@ class CounterInput(InputWork):
             clock = self.task.clock
             if self.samples is not None and clock is not None and clock.implicit:
                 more = self._intervals.most(now) - 1
-                if self.task.wanted is None and self.samples.waiting + more > self.samples.room:
+                waiting = self.samples.total - self.task.delivered
+                full = waiting + more > self.samples.room and not self.task.overwrites
+                if self.task.wanted is None and full:
                     self.task.failed = Code.SAMPLES_OVERWRITTEN
                     return
             values, ends = self._intervals.complete(now)
@@ -372,7 +379,7 @@ class CounterInput(InputWork):
                 self._last = values[:, -1:]
                 if self.samples is None:
                     self._ready, self._ends = [], np.empty(0)
-        super().settle(now)
+        super().watch(now)
 
     def _new(self, now: float) -> int:
         clock = self.task.clock
@@ -431,12 +438,12 @@ class CounterInput(InputWork):
             return ticks / TIMEBASE
         return (ticks if channel.units == TICKS else ticks / TIMEBASE)[:1]
 
-    def still(self, now: float) -> np.ndarray | None:
+    def still(self, samples: int, now: float) -> np.ndarray | None:  # noqa: ARG002
         if not self._running:
             return None
         if self.counts:
             return self._values(np.array([now]))
-        self.settle(now)
+        self.watch(now)
         return None if self._last is None else self._scaled(self._last)
 
     def still_due(self, now: float) -> float | None:
@@ -444,12 +451,12 @@ class CounterInput(InputWork):
             return self._waits.due()
         return now if self.counts else self._intervals.next(1)
 
-    def due(self, samples: int, now: float) -> float | None:
+    def due(self, samples: int | None, now: float) -> float | None:
         if self._waits.edge is not None:
             return self._waits.due()
         clock = self.task.clock
         if clock is not None and clock.implicit and self.samples is not None:
-            return self._intervals.next(max(1, samples - self._new(now)))
+            return self._intervals.next(max(1, (samples or 1) - self._new(now)))
         return super().due(samples, now)
 
     def done(self, now: float) -> bool:

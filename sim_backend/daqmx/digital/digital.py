@@ -8,27 +8,16 @@ import numpy as np
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.output import Generation
-from dearig.sim_backend.daqmx.card.signals import Series
 from dearig.sim_backend.daqmx.card.tasks import Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.triggers import AwaitedEdge, Edge, SampleTicks
-from dearig.sim_backend.daqmx.card.work import InputWork, Samples, Work
+from dearig.sim_backend.daqmx.card.work import SampledInput, Samples, Work
+from dearig.sim_backend.daqmx.running.output_buffer import may_generate
 
-__all__ = ["DigitalInput", "DigitalOutput", "check_clocked_lines"]
-
-
-def check_clocked_lines(task: Task) -> None:
-    """Refuse lines that the card cannot read or write with a sample clock."""
-    for line in task.line_names:
-        if not line.startswith("port0/"):
-            raise DaqmxError(
-                Code.INVALID_VALUE,
-                f"Property: SampTimingType; Requested Value: Sample Clock; a sample clock is for "
-                f"lines of port 0. Physical Channel: {line}",
-            )
+__all__ = ["DigitalInput", "DigitalOutput"]
 
 
-class DigitalInput(InputWork):
+class DigitalInput(SampledInput):
     """Lines of ``task`` as they are at ``terminals``; ``timing(now)`` makes the clock.
 
     With ``counts`` a line for which it is True reads one bit of the number of the sample, as
@@ -40,7 +29,7 @@ class DigitalInput(InputWork):
         task: Task,
         terminals: Terminals,
         timing: Callable[[Task, float], SampleTicks],
-        room: Callable[[Task], int],
+        buffer_size: Callable[[Task], int],
         counts: Callable[[str], bool] | None = None,
     ) -> None:
         super().__init__(task)
@@ -48,7 +37,7 @@ class DigitalInput(InputWork):
         self._timing = timing
         self._counts = counts
         self._reads = 0  # samples that were read without a clock
-        self._room = room
+        self._buffer_size = buffer_size
 
     def resources(self) -> list[str]:
         return ["digital input timing"] if self.task.clock is not None else []
@@ -56,7 +45,8 @@ class DigitalInput(InputWork):
     def start(self, now: float) -> None:
         if self.task.clock is not None:
             self.ticks = self._timing(self.task, now)
-            self.samples = Samples(len(self.task.line_names), self._room(self.task), np.uint8)
+            room = self._buffer_size(self.task)
+            self.samples = Samples(len(self.task.line_names), room, np.uint8)
 
     def _new(self, now: float) -> int:
         return 0 if self.ticks is None else self.ticks.passed(now)
@@ -77,7 +67,7 @@ class DigitalInput(InputWork):
         ]
         return np.array(levels, dtype=np.uint8)
 
-    def still(self, now: float) -> np.ndarray:
+    def still(self, samples: int, now: float) -> np.ndarray:  # noqa: ARG002
         self._reads += 1
         return self._levels(np.array([now]), self._reads - 1)
 
@@ -92,7 +82,8 @@ class DigitalOutput(Work):
     """Lines of ``task`` on a sample clock. ``set_line(line, level, time)`` tells the wire.
 
     The lines go through the written samples as the outputs do, with their buffer and
-    regeneration. ``trigger(task)`` is the edge that starts it, or None.
+    regeneration. ``trigger(task)`` is the edge that starts it, or None. ``check_watchdog(task)``
+    refuses a start while a watchdog holds the lines.
     """
 
     def __init__(
@@ -101,13 +92,20 @@ class DigitalOutput(Work):
         terminals: Terminals,
         set_line: Callable[[str, bool, float], None],
         trigger: Callable[[Task], Edge | None],
+        check_watchdog: Callable[[Task], None],
     ) -> None:
         super().__init__(task)
+        self._check_watchdog = check_watchdog
         self._terminals = terminals
         self._set_line = set_line
         self._trigger = trigger
         self._waits = AwaitedEdge()
         self._told = 0  # ticks that the wire knows
+
+    def check_start(self) -> None:
+        if self.task.clock is not None:
+            self._check_watchdog(self.task)
+            may_generate(self.task)
 
     def resources(self) -> list[str]:
         timing = ["digital output timing"] if self.task.clock is not None else []
@@ -157,14 +155,6 @@ class DigitalOutput(Work):
         self._told = end
         generation.waveform.drop_before(max(0, end - 1))
 
-    def series(self) -> Series | None:
-        """Return the times of the sample clock."""
-        generation = self.task.generation
-        if generation is None:
-            return None
-        total = generation.ended if generation.ended is not None else generation.total
-        return Series(generation.start, np.zeros(1), 1.0 / generation.rate, total)
-
     def end(self, now: float) -> None:
         self._waits.begin(None, now)
         if self.task.generation is not None:
@@ -183,7 +173,7 @@ class DigitalOutput(Work):
     def passed(self, now: float) -> int:
         return 0 if self.task.generation is None else self.task.generation.ticks(now)
 
-    def due(self, samples: int, now: float) -> float | None:  # noqa: ARG002
+    def due(self, samples: int | None, now: float) -> float | None:  # noqa: ARG002
         if self.task.generation is not None:
-            return self.task.generation.due(samples)
+            return self.task.generation.due(samples or 1)
         return self._waits.due()

@@ -117,6 +117,8 @@ class CounterOutput(Work):
     ``clock(task, now)`` the edge of a sample clock, at which the next written pulse is taken.
     """
 
+    may_be_implicit = True
+
     def __init__(
         self,
         task: Task,
@@ -127,7 +129,6 @@ class CounterOutput(Work):
     ) -> None:
         super().__init__(task)
         self.channels = channels
-        self.written: list[Pulse] = []  # for a buffered train
         self._signals = signals
         self._trigger = trigger
         self._clock = clock
@@ -144,7 +145,7 @@ class CounterOutput(Work):
 
     def start(self, now: float) -> None:
         clock = self.task.clock
-        if clock is not None and not clock.implicit and not self.written:
+        if clock is not None and not clock.implicit and not self.task.pulses:
             raise DaqmxError(Code.OUTPUT_BUFFER_EMPTY, f"Task Name: {self.task.name}")
         for channel in self.channels:
             self.signal(channel).idle_high = channel.idle_high
@@ -166,9 +167,9 @@ class CounterOutput(Work):
         clock = self.task.clock
         self._samples = 0
         self._sampled = None
-        buffered = self.written and clock is not None and clock.implicit
+        buffered = self.task.pulses and clock is not None and clock.implicit
         for channel in self.channels:
-            pulses = self.written if buffered else [channel.pulse]
+            pulses = self.task.pulses if buffered else [channel.pulse]
             total = self.total
             if clock is not None and not clock.implicit:
                 total = None
@@ -202,7 +203,7 @@ class CounterOutput(Work):
             for at in edge.signal.edges(since, now, edge.rising).tolist():
                 if self.total is not None and self._samples >= self.total:
                     break
-                self._load(self.written[self._samples % len(self.written)], at)
+                self._load(self.task.pulses[self._samples % len(self.task.pulses)], at)
                 self._samples += 1
             self._sampled = (edge, now)
 
@@ -226,9 +227,9 @@ class CounterOutput(Work):
         clock = self.task.clock
         sampled = clock is not None and not clock.implicit
         if not self.task.running or (sampled and not self.task.regenerates):
-            self.written = self.written + pulses
+            self.task.pulses = self.task.pulses + pulses
         else:
-            self.written = list(pulses)
+            self.task.pulses = list(pulses)
             if clock is not None and clock.implicit:
                 self._replace(now)
 
@@ -240,9 +241,9 @@ class CounterOutput(Work):
             return
         burst = signal.bursts[-1]
         burst.ended = burst.boundary(now)
-        idle = self.written[0].high if channel.idle_high else self.written[0].low
-        total = None if self.task.regenerates else len(self.written)
-        signal.bursts.append(self._burst(channel, self.written, burst.ended, idle, total))
+        idle = self.task.pulses[0].high if channel.idle_high else self.task.pulses[0].low
+        total = None if self.task.regenerates else len(self.task.pulses)
+        signal.bursts.append(self._burst(channel, self.task.pulses, burst.ended, idle, total))
 
     def _load(self, pulse: Pulse, at: float, channel: PulseChannel | None = None) -> None:
         for each in self.channels if channel is None else [channel]:
@@ -289,7 +290,7 @@ class CounterOutput(Work):
     def _own(self) -> list[Burst]:
         return self.signal(self.channels[0]).bursts if self.task.running else []
 
-    def due(self, samples: int, now: float) -> float | None:
+    def due(self, samples: int | None, now: float) -> float | None:
         if self._waits.edge is not None:
             return self._waits.due(now)
         if self._sampled is not None:
@@ -297,4 +298,4 @@ class CounterOutput(Work):
         burst = self.signal(self.channels[0]).bursts[-1]
         if burst.total is not None:
             return float(burst.ends.time(burst.total - 1))
-        return burst.ends.nth(now, max(1, samples - self.passed(now)))
+        return burst.ends.nth(now, max(1, (samples or 1) - self.passed(now)))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.card.hardware import INPUT_RANGES, INPUTS, LINES, OUTPUTS
 from dearig.sim_backend.daqmx.card.sensors import Usage
-from dearig.sim_backend.daqmx.card.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
 from dearig.sim_backend.daqmx.card.tasks import LINES_RATE, TIMEBASE
 from dearig.sim_backend.daqmx.card.terminals import COUNTERS
 from dearig.sim_backend.daqmx.digital.counters import Measure
@@ -55,7 +55,7 @@ SYSTEM = {
     "DEV_NAMES": given(lambda a: a.device.name),
     "TASKS": given(""),  # saved ones
     "GLOBAL_CHANS": given(""),
-    "SCALES": given(lambda a: ", ".join(s.name for s in a.device.scales.values() if s.saved)),
+    "SCALES": given(lambda a: ", ".join(a.device.scales.saved())),
 }
 
 DEVICE = {
@@ -80,9 +80,9 @@ DEVICE = {
     "AI_VOLTAGE_INT_EXCIT_DISCRETE_VALS": given(()),
     "AI_GAINS": given(()),
     "AI_COUPLINGS": given(_DC),
-    "AI_MAX_SINGLE_CHAN_RATE": given(lambda a: a.device.fastest_input),
+    "AI_MAX_SINGLE_CHAN_RATE": given(lambda a: a.device.timing.fastest_input),
     "AI_MAX_MULTI_CHAN_RATE": given(lambda a: 1e3 * a.device.settings.card.ai_rate_max_kHz),
-    "AI_MIN_RATE": given(lambda a: a.device.slowest),
+    "AI_MIN_RATE": given(lambda a: a.device.timing.slowest),
     "AI_SIMULTANEOUS_SAMPLING_SUPPORTED": given(False),
     "AI_NUM_SAMP_TIMING_ENGINES": given(1),
     "AI_SAMP_MODES": given([10178, 10123]),
@@ -94,7 +94,7 @@ DEVICE = {
     "AO_NUM_SAMP_TIMING_ENGINES": given(1),
     "AO_SAMP_MODES": given([10178, 10123]),
     "AO_MAX_RATE": given(lambda a: 1e3 * a.device.settings.card.ao_rate_max_kHz),
-    "AO_MIN_RATE": given(lambda a: a.device.slowest),
+    "AO_MIN_RATE": given(lambda a: a.device.timing.slowest),
     "AO_TRIG_USAGE": given(_START),
     "DI_LINES": given(lambda a: _names(a, LINES)),
     "DI_PORTS": given(lambda a: _names(a, _ports())),
@@ -124,7 +124,7 @@ DEVICE = {
 
 
 def _set_note(asked: Asked, value: str) -> None:
-    asked.device.kept[_NOTE] = value[:_NOTE_CHARACTERS]
+    asked.device.state.kept[_NOTE] = value[:_NOTE_CHARACTERS]
 
 
 CALIBRATION = {
@@ -133,7 +133,7 @@ CALIBRATION = {
     "EXT_CAL_LAST_TEMP": given(0.0),
     "EXT_CAL_RECOMMENDED_INTERVAL": given(24),  # months
     "CAL_DEV_TEMP": given(0.0),  # degrees Celsius, as NI's simulated devices say
-    "CAL_USER_DEFINED_INFO": changed(lambda a: a.device.kept.get(_NOTE, ""), _set_note),
+    "CAL_USER_DEFINED_INFO": changed(lambda a: a.device.state.kept.get(_NOTE, ""), _set_note),
     "CAL_USER_DEFINED_INFO_MAX_SIZE": given(_NOTE_CHARACTERS),
 }
 
@@ -160,11 +160,11 @@ def _wirings(asked: Asked) -> int:
 
 
 def _port_lines(asked: Asked) -> int:
-    return len(asked.device.lines_of(asked.channel))
+    return len(asked.device.levels.lines_of(asked.channel))
 
 
 def _has_sample_clock(asked: Asked) -> bool:
-    return all(line.startswith("port0") for line in asked.device.lines_of(asked.channel))
+    return all(line.startswith("port0") for line in asked.device.levels.lines_of(asked.channel))
 
 
 PHYSICAL_CHANNEL = {

@@ -48,7 +48,7 @@ def _units(asked: Asked) -> int:
 def _set_units(asked: Asked, value: int) -> None:
     channel = asked.analog()
     if value == VOLTS:
-        asked.device.set_scale(asked.own, channel, "")
+        asked.device.channels.set_scale(asked.own, channel, "")
     elif value != FROM_CUSTOM_SCALE or channel.scale is None:
         raise DaqmxError(
             Code.INVALID_VALUE if value != FROM_CUSTOM_SCALE else Code.UNKNOWN_SCALE,
@@ -61,7 +61,7 @@ def _scale_name(asked: Asked) -> str:
     return "" if scale is None else scale.name
 
 
-_SCALE = changed(_scale_name, lambda a, v: a.device.set_scale(a.own, a.analog(), v), "")
+_SCALE = changed(_scale_name, lambda a, v: a.device.channels.set_scale(a.own, a.analog(), v), "")
 _UNITS = changed(_units, _set_units, VOLTS)
 
 
@@ -78,13 +78,17 @@ def _span(asked: Asked) -> tuple[float, float]:
     return float(ends.min()), float(ends.max())
 
 
-_LOW = changed(lambda a: _span(a)[0], lambda a, v: a.device.set_limits(a.own, a.analog(), low=v))
-_HIGH = changed(lambda a: _span(a)[1], lambda a, v: a.device.set_limits(a.own, a.analog(), high=v))
+_LOW = changed(
+    lambda a: _span(a)[0], lambda a, v: a.device.channels.set_limits(a.own, a.analog(), low=v)
+)
+_HIGH = changed(
+    lambda a: _span(a)[1], lambda a, v: a.device.channels.set_limits(a.own, a.analog(), high=v)
+)
 _RANGE_LOW = changed(
-    lambda a: -a.analog().range, lambda a, v: a.device.set_range(a.own, a.analog(), -v)
+    lambda a: -a.analog().range, lambda a, v: a.device.channels.set_range(a.own, a.analog(), -v)
 )
 _RANGE_HIGH = changed(
-    lambda a: a.analog().range, lambda a, v: a.device.set_range(a.own, a.analog(), v)
+    lambda a: a.analog().range, lambda a, v: a.device.channels.set_range(a.own, a.analog(), v)
 )
 
 
@@ -160,14 +164,16 @@ CHANNEL = {
     "AI_VOLTAGE_UNITS": _UNITS,
     "AI_CUSTOM_SCALE_NAME": _SCALE,
     "AI_TERM_CFG": changed(
-        lambda a: a.input().wiring, lambda a, v: a.device.set_wiring(a.own, a.input(), v), -1
+        lambda a: a.input().wiring,
+        lambda a, v: a.device.channels.set_wiring(a.own, a.input(), v),
+        -1,
     ),
     "AI_MAX": _HIGH,
     "AI_MIN": _LOW,
     "AI_RNG_HIGH": _RANGE_HIGH,
     "AI_RNG_LOW": _RANGE_LOW,
     "AI_COUPLING": fixed(_DC),
-    "AI_DEV_SCALING_COEFF": given(lambda a: a.device.scaling(a.own, a.input().name)),
+    "AI_DEV_SCALING_COEFF": given(lambda a: a.device.channels.scaling(a.own, a.input().name)),
     "AI_RESOLUTION": given(16.0),
     "AI_RESOLUTION_UNITS": fixed(_BITS),
     "AI_RAW_SAMP_SIZE": given(16),
@@ -199,7 +205,7 @@ CHANNEL = {
     "AO_DATA_XFER_MECH": accepted(_DMA, _DMA, _INTERRUPT, _POLLED),
     "AO_DATA_XFER_REQ_COND": accepted(_LESS_THAN_FULL, _EMPTY, _HALF_FULL_OR_LESS, _LESS_THAN_FULL),
     "AO_MEM_MAP_ENABLE": accepted(False),
-    "AO_DEV_SCALING_COEFF": given(lambda a: a.device.scaling(a.own, a.output().name)),
+    "AO_DEV_SCALING_COEFF": given(lambda a: a.device.channels.scaling(a.own, a.output().name)),
     "AO_RESOLUTION": given(16.0),
     "AO_RESOLUTION_UNITS": fixed(_BITS),
     # digital input

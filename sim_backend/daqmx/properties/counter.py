@@ -50,7 +50,7 @@ def _field(name: str, *measures: Measure) -> Property:
 
     def set_field(asked: Asked, value: Any) -> None:
         channel = _of(asked, wanted)
-        asked.device.change_channel(asked.own, channel, name, value)
+        asked.device.counters.change(asked.own, channel, name, value)
 
     return Property((lambda a: getattr(_of(a, wanted), name)), set_field)
 
@@ -61,7 +61,7 @@ def _edge(name: str, *measures: Measure) -> Property:
     def set_edge(asked: Asked, value: int) -> None:
         if value not in (RISING, FALLING):
             raise DaqmxError(Code.INVALID_VALUE, f"Property: edge; Requested Value: {value}")
-        asked.device.change_channel(asked.own, _of(asked, measures), name, value)
+        asked.device.counters.change(asked.own, _of(asked, measures), name, value)
 
     return Property(getter, set_edge)
 
@@ -70,12 +70,12 @@ def _terminal(role: str, *measures: Measure) -> Property:
     """Return getter and setter of the terminal of a role."""
 
     def get(asked: Asked) -> str:
-        return asked.device.full_terminal(_of(asked, measures).terminals[role])
+        return asked.device.terminals.full_source(_of(asked, measures).terminals[role])
 
     def set_(asked: Asked, value: str) -> None:
         channel = _of(asked, measures)
         terminals = channel.terminals | {role: asked.device.terminals.name(value)}
-        asked.device.change_channel(asked.own, channel, "terminals", terminals)
+        asked.device.counters.change(asked.own, channel, "terminals", terminals)
 
     return Property(get, set_)
 
@@ -85,14 +85,14 @@ def _limit(place: int) -> Property:
         channel = _counter(asked)
         limits = list(channel.limits)
         limits[place] = value
-        asked.device.change_channel(asked.own, channel, "limits", (limits[0], limits[1]))
+        asked.device.counters.change(asked.own, channel, "limits", (limits[0], limits[1]))
 
     return Property((lambda a: _counter(a).limits[place]), set_)
 
 
 def _count(asked: Asked) -> int:
     channel = _counter(asked)
-    return asked.device.count(asked.own) if channel.measure == Measure.COUNT_EDGES else 0
+    return asked.device.counters.count(asked.own) if channel.measure == Measure.COUNT_EDGES else 0
 
 
 _EDGES, _FREQUENCY, _PERIOD = Measure.COUNT_EDGES, Measure.FREQUENCY, Measure.PERIOD
@@ -181,7 +181,7 @@ def _pulse(
 
     def set_(asked: Asked, value: Any) -> None:
         channel = _pulses(asked, kind)
-        asked.device.change_pulse(asked.own, channel, change(channel.pulse, value))
+        asked.device.counters.change_pulse(asked.own, channel, change(channel.pulse, value))
 
     return Property((lambda a: get(_pulses(a, kind).pulse)), set_, running=True)
 
@@ -196,7 +196,7 @@ def _duty(pulse: Pulse) -> float:
 
 def _delay(kind: int, per_second: float = 1.0) -> Property:
     def set_(asked: Asked, value: float) -> None:
-        asked.device.change_channel(asked.own, _pulses(asked, kind), "delay", value / per_second)
+        asked.device.counters.change(asked.own, _pulses(asked, kind), "delay", value / per_second)
 
     def get(asked: Asked) -> float:
         delay = _pulses(asked, kind).delay * per_second
@@ -210,18 +210,18 @@ def _set_output_terminal(asked: Asked, value: str) -> None:
     output = asked.device.terminals.name(value)
     if output not in PFI:
         raise DaqmxError(Code.ROUTE_NOT_SUPPORTED, f"Destination Terminal: {value}")
-    asked.device.change_channel(asked.own, channel, "output", output)
+    asked.device.counters.change(asked.own, channel, "output", output)
 
 
 def _set_idle(asked: Asked, value: int) -> None:
     if value not in (HIGH, LOW):
         raise DaqmxError(Code.INVALID_VALUE, f"Property: CO.Pulse.IdleState; Value: {value}")
-    asked.device.change_channel(asked.own, _pulses(asked), "idle_high", value == HIGH)
+    asked.device.counters.change(asked.own, _pulses(asked), "idle_high", value == HIGH)
 
 
 def _pulse_done(asked: Asked) -> bool:
     work = _pulses(asked) and asked.own.work
-    return isinstance(work, CounterOutput) and asked.device.is_done(asked.own)
+    return isinstance(work, CounterOutput) and asked.device.states.is_done(asked.own)
 
 
 _OUTPUTS: dict[str, Property] = {
@@ -255,11 +255,11 @@ _OUTPUTS: dict[str, Property] = {
     "CO_PULSE_TICKS_INITIAL_DELAY": _delay(_PULSE_TICKS, TIMEBASE),
     "CO_PULSE_IDLE_STATE": Property(lambda a: HIGH if _pulses(a).idle_high else LOW, _set_idle),
     "CO_PULSE_TERM": Property(
-        lambda a: a.device.full_terminal(_pulses(a).output), _set_output_terminal
+        lambda a: a.device.terminals.full_source(_pulses(a).output), _set_output_terminal
     ),
     "CO_PULSE_DONE": given(_pulse_done),
     "CO_RDY_FOR_NEW_VAL": given(lambda a: _pulses(a) and a.own.running),
-    "CO_OUTPUT_STATE": given(lambda a: HIGH if a.device.output_level(_pulses(a)) else LOW),
+    "CO_OUTPUT_STATE": given(lambda a: HIGH if a.device.counters.output_level(_pulses(a)) else LOW),
     "CO_CTR_TIMEBASE_SRC": fixed("100MHzTimebase"),
     "CO_CTR_TIMEBASE_RATE": fixed(TIMEBASE),
     "CO_ENABLE_INITIAL_DELAY_ON_RETRIGGER": fixed(False),

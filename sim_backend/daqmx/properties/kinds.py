@@ -204,7 +204,7 @@ def accepted(
 def _kept(asked: Asked) -> dict[object, Any]:
     """Return where the accepted values of the question's target are kept."""
     if asked.task is None:
-        return asked.device.kept
+        return asked.device.state.kept
     return asked.first().kept if asked.channel else asked.task.kept_properties
 
 

@@ -14,7 +14,7 @@ __all__ = ["SAVED_SCALE", "SCALE"]
 
 def _scale(asked: Asked, kind: int | None) -> Scale:
     """Return the asked scale; raises an error unless it is of ``kind`` (None: any)."""
-    scale = asked.device.scale(asked.channel)
+    scale = asked.device.scales.find(asked.channel)
     if kind not in (None, scale.kind):
         raise DaqmxError(Code.NOT_FOR_THIS_SCALE, f"Custom Scale Name: {scale.name}")
     return scale

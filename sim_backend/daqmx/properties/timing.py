@@ -30,14 +30,14 @@ def _side(asked: Asked) -> str:
 
 
 def _clock_source(asked: Asked) -> str:
-    asked.device.timing_of(asked.own)
+    asked.device.timing.clock_of(asked.own)
     if not asked.own.timing.source:
         return f"/{asked.device.name}/{_side(asked)}/SampleClockTimebase"
-    return asked.device.full_terminal(asked.own.timing.source)
+    return asked.device.terminals.full_source(asked.own.timing.source)
 
 
 def _clock_terminal(asked: Asked) -> str:
-    asked.device.timing_of(asked.own)
+    asked.device.timing.clock_of(asked.own)
     return f"/{asked.device.name}/{_side(asked)}/SampleClock"
 
 
@@ -51,7 +51,7 @@ def _type(asked: Asked) -> int:
 def _set_type(asked: Asked, value: int) -> None:
     if value == _IMPLICIT:
         timing = asked.own.timing
-        asked.device.set_implicit(asked.own, timing.finite, timing.samples)
+        asked.device.timing.set_implicit(asked.own, timing.finite, timing.samples)
         return
     if value not in (_SAMPLE_CLOCK, _ON_DEMAND):
         raise DaqmxError(
@@ -60,7 +60,7 @@ def _set_type(asked: Asked, value: int) -> None:
             f"{asked.where}",
         )
     asked.own.timing.implicit = False
-    asked.device.set_clocked(asked.own, value == _SAMPLE_CLOCK)
+    asked.device.timing.set_clocked(asked.own, value == _SAMPLE_CLOCK)
 
 
 def _set_mode(asked: Asked, value: int) -> None:
@@ -69,7 +69,7 @@ def _set_mode(asked: Asked, value: int) -> None:
             Code.INVALID_VALUE,
             f"Requested Value: {value}; You Can Select: {_FINITE}, {_CONTINUOUS}; {asked.where}",
         )
-    asked.device.change_clock(asked.own, finite=value == _FINITE)
+    asked.device.timing.change_clock(asked.own, finite=value == _FINITE)
 
 
 def _set_clock_edge(asked: Asked, value: int) -> None:
@@ -78,21 +78,21 @@ def _set_clock_edge(asked: Asked, value: int) -> None:
             Code.INVALID_VALUE,
             f"Requested Value: {value}; You Can Select: {RISING}, {FALLING}; {asked.where}",
         )
-    asked.device.timing_of(asked.own).edge = value
+    asked.device.timing.clock_of(asked.own).edge = value
 
 
 def _timebase(asked: Asked) -> float:
-    return asked.device.settings.card.timebase_MHz * 1e6
+    return asked.device.timing.timebase
 
 
 def _divisor(asked: Asked) -> int:
-    return round(_timebase(asked) / asked.device.timing_of(asked.own).rate)
+    return round(_timebase(asked) / asked.device.timing.clock_of(asked.own).rate)
 
 
 def _set_divisor(asked: Asked, value: int) -> None:
     if value < 1:
         raise DaqmxError(Code.INVALID_VALUE, f"Requested Value: {value}; {asked.where}")
-    asked.device.change_clock(asked.own, rate=_timebase(asked) / value)
+    asked.device.timing.change_clock(asked.own, rate=_timebase(asked) / value)
 
 
 def _input_only(asked: Asked) -> object:
@@ -105,52 +105,57 @@ def _output_only(asked: Asked) -> object:
 
 def _default_rate(asked: Asked) -> float:
     asked.own.convert_ticks = None
-    return _timebase(asked) / asked.device.convert_ticks(asked.own)
+    return _timebase(asked) / asked.device.conversions.ticks(asked.own)
 
 
 TIMING: dict[str, Property] = {
     "SAMP_TIMING_TYPE": changed(_type, _set_type, _ON_DEMAND),
     "SAMP_CLK_RATE": changed(
-        lambda a: a.device.timing_of(a.own).rate,
-        lambda a, v: a.device.change_clock(a.own, rate=v),
+        lambda a: a.device.timing.clock_of(a.own).rate,
+        lambda a, v: a.device.timing.change_clock(a.own, rate=v),
         _RATE,
     ),
-    "SAMP_CLK_MAX_RATE": given(lambda a: a.device.fastest(a.own)),
-    "SAMP_CLK_SRC": changed(_clock_source, lambda a, v: a.device.change_clock(a.own, source=v), ""),
+    "SAMP_CLK_MAX_RATE": given(lambda a: a.device.timing.fastest(a.own)),
+    "SAMP_CLK_SRC": changed(
+        _clock_source, lambda a, v: a.device.timing.change_clock(a.own, source=v), ""
+    ),
     "SAMP_CLK_TERM": given(_clock_terminal),
     "SAMP_CLK_ACTIVE_EDGE": changed(
-        lambda a: a.device.timing_of(a.own).edge, _set_clock_edge, RISING
+        lambda a: a.device.timing.clock_of(a.own).edge, _set_clock_edge, RISING
     ),
     "SAMP_CLK_TIMEBASE_RATE": fixed(_timebase),
     "SAMP_CLK_TIMEBASE_DIV": changed(_divisor, _set_divisor, lambda a: round(_timebase(a) / _RATE)),
     "SAMP_CLK_TIMEBASE_SRC": fixed(lambda a: f"/{a.device.name}/100MHzTimebase"),
     "SAMP_CLK_TIMEBASE_ACTIVE_EDGE": fixed(RISING),
     "SAMP_QUANT_SAMP_MODE": changed(
-        lambda a: _FINITE if a.device.timing_of(a.own).finite else _CONTINUOUS,
+        lambda a: _FINITE if a.device.timing.clock_of(a.own).finite else _CONTINUOUS,
         _set_mode,
         _CONTINUOUS,
     ),
     "SAMP_QUANT_SAMP_PER_CHAN": changed(
-        lambda a: a.device.samples_of(a.own),
-        lambda a, v: a.device.change_clock(a.own, samples=v),
+        lambda a: a.device.timing.samples(a.own),
+        lambda a, v: a.device.timing.change_clock(a.own, samples=v),
         _SAMPLES,
     ),
     "AI_CONV_RATE": changed(
-        lambda a: _timebase(a) / a.device.convert_ticks(a.of_kind(Kind.AI)),
-        lambda a, v: a.device.set_convert_rate(a.own, v),
+        lambda a: _timebase(a) / a.device.conversions.ticks(a.of_kind(Kind.AI)),
+        lambda a, v: a.device.conversions.set_rate(a.own, v),
         _default_rate,
     ),
     "AI_CONV_MAX_RATE": given(lambda a: 1e3 * a.device.settings.card.ai_rate_max_kHz),
     "AI_CONV_TIMEBASE_DIV": changed(
-        lambda a: a.device.convert_ticks(a.of_kind(Kind.AI)),
-        lambda a, v: a.device.set_convert_rate(a.own, _timebase(a) / max(v, 1)),
+        lambda a: a.device.conversions.ticks(a.of_kind(Kind.AI)),
+        lambda a, v: a.device.conversions.set_rate(a.own, _timebase(a) / max(v, 1)),
     ),
     "AI_CONV_ACTIVE_EDGE": fixed(RISING),
     "DELAY_FROM_SAMP_CLK_DELAY": changed(
-        lambda a: a.device.delay(a.own), lambda a, v: a.device.set_delay(a.own, v)
+        lambda a: a.device.conversions.delay(a.own),
+        lambda a, v: a.device.conversions.set_delay(a.own, v),
     ),
     "DELAY_FROM_SAMP_CLK_DELAY_UNITS": changed(
-        lambda a: a.own.delay_units, lambda a, v: a.device.set_delay_units(a.own, v), _TICKS
+        lambda a: a.own.delay_units,
+        lambda a, v: a.device.conversions.set_delay_units(a.own, v),
+        _TICKS,
     ),
     "ON_DEMAND_SIMULTANEOUS_AO_ENABLE": accepted(False, needs=_output_only),
     "REF_CLK_SRC": fixed(""),
@@ -161,23 +166,23 @@ WITH_DEVICE = {name for name in TIMING if name.startswith("AI_CONV_")}
 
 
 def _trigger_source(asked: Asked) -> str:
-    return asked.device.full_terminal(asked.own.trigger) if asked.own.trigger else ""
+    return asked.device.terminals.full_source(asked.own.trigger) if asked.own.trigger else ""
 
 
 TRIGGER: dict[str, Property] = {
     "START_TRIG_TYPE": changed(
         lambda a: a.own.trigger_type,
-        lambda a, v: a.device.set_trigger_type(a.own, v),
+        lambda a, v: a.device.triggering.set_start_type(a.own, v),
         _NO_TRIGGER,
     ),
     "DIG_EDGE_START_TRIG_SRC": changed(
         _trigger_source,
-        lambda a, v: a.device.set_trigger(a.own, v, a.own.trigger_edge),
+        lambda a, v: a.device.triggering.set_start(a.own, v, a.own.trigger_edge),
         "",
     ),
     "DIG_EDGE_START_TRIG_EDGE": changed(
         lambda a: a.own.trigger_edge,
-        lambda a, v: a.device.set_trigger_edge(a.own, v),
+        lambda a, v: a.device.triggering.set_start_edge(a.own, v),
         RISING,
     ),
     # a filter delays an edge by less than the simulation resolves

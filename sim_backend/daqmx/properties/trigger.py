@@ -44,7 +44,7 @@ def _reference_field(name: str, *, level: bool | None = None, starts: bool = Fal
     def set_(asked: Asked, value: Any) -> None:
         other = dataclasses.replace(_reference(asked, level=level, starts=starts), at=None)
         setattr(other, name, value == RISING if name == "rising" else value)
-        asked.device.set_reference(asked.own, other)
+        asked.device.triggering.set_reference(asked.own, other)
 
     def get(asked: Asked) -> Any:
         value = getattr(_reference(asked, level=level, starts=starts), name)
@@ -52,7 +52,7 @@ def _reference_field(name: str, *, level: bool | None = None, starts: bool = Fal
             return RISING if value else FALLING
         if name == "terminal":
             prefix = f"{asked.device.name}/{value}"
-            return prefix if level else asked.device.full_terminal(value)
+            return prefix if level else asked.device.terminals.full_source(value)
         return value
 
     return Property(get, set_)
@@ -67,7 +67,7 @@ def _reference_type(asked: Asked) -> int:
 
 def _set_reference_type(asked: Asked, value: int) -> None:
     if value == NO_TRIGGER:
-        asked.device.set_reference(asked.own, None)
+        asked.device.triggering.set_reference(asked.own, None)
     elif value != _reference_type(asked):
         raise DaqmxError(
             Code.INVALID_VALUE,
@@ -86,9 +86,9 @@ def _set_pause_type(asked: Asked, value: int) -> None:
     if value not in (NO_TRIGGER, _DIGITAL_LEVEL):
         raise DaqmxError(Code.INVALID_VALUE, f"Property: PauseTrig.Type; Requested Value: {value}")
     if value == NO_TRIGGER:
-        asked.device.set_pause(asked.own, None)
+        asked.device.triggering.set_pause(asked.own, None)
     elif asked.own.pause is None:
-        asked.device.set_pause(asked.own, ("", True))
+        asked.device.triggering.set_pause(asked.own, ("", True))
 
 
 def _arm(asked: Asked) -> tuple[str, bool]:
@@ -103,9 +103,9 @@ def _set_arm_type(asked: Asked, value: int) -> None:
             Code.INVALID_VALUE, f"Property: ArmStartTrig.Type; Requested Value: {value}"
         )
     if value == NO_TRIGGER:
-        asked.device.set_arm(asked.own, None)
+        asked.device.triggering.set_arm(asked.own, None)
     elif asked.own.arm is None:
-        asked.device.set_arm(asked.own, ("", True))
+        asked.device.triggering.set_arm(asked.own, ("", True))
 
 
 def _level(value: int) -> bool:
@@ -124,7 +124,7 @@ def _trigger_terminal(what: str) -> Getter:
 
 MORE_TRIGGERS: dict[str, Property] = {
     "START_TRIG_RETRIGGERABLE": changed(
-        lambda a: a.own.retriggers, lambda a, v: a.device.set_retriggers(a.own, v), False
+        lambda a: a.own.retriggers, lambda a, v: a.device.triggering.set_retriggers(a.own, v), False
     ),
     "START_TRIG_DELAY": fixed(0.0),
     "START_TRIG_DELAY_UNITS": fixed(10304, _SECONDS, 10286),
@@ -148,24 +148,24 @@ MORE_TRIGGERS: dict[str, Property] = {
         NO_TRIGGER,
     ),
     "DIG_LVL_PAUSE_TRIG_SRC": Property(
-        lambda a: a.device.full_terminal(_pause(a)[0]),
-        lambda a, v: a.device.set_pause(a.own, (v, _pause(a)[1])),
+        lambda a: a.device.terminals.full_source(_pause(a)[0]),
+        lambda a, v: a.device.triggering.set_pause(a.own, (v, _pause(a)[1])),
     ),
     "DIG_LVL_PAUSE_TRIG_WHEN": Property(
         lambda a: HIGH if _pause(a)[1] else LOW,
-        lambda a, v: a.device.set_pause(a.own, (_pause(a)[0], _level(v))),
+        lambda a, v: a.device.triggering.set_pause(a.own, (_pause(a)[0], _level(v))),
     ),
     "PAUSE_TRIG_TERM": given(_trigger_terminal("PauseTrigger")),
     "ARM_START_TRIG_TYPE": changed(
         lambda a: NO_TRIGGER if a.own.arm is None else DIGITAL_EDGE, _set_arm_type, NO_TRIGGER
     ),
     "DIG_EDGE_ARM_START_TRIG_SRC": Property(
-        lambda a: a.device.full_terminal(_arm(a)[0]),
-        lambda a, v: a.device.set_arm(a.own, (v, _arm(a)[1])),
+        lambda a: a.device.terminals.full_source(_arm(a)[0]),
+        lambda a, v: a.device.triggering.set_arm(a.own, (v, _arm(a)[1])),
     ),
     "DIG_EDGE_ARM_START_TRIG_EDGE": Property(
         lambda a: RISING if _arm(a)[1] else FALLING,
-        lambda a, v: a.device.set_arm(a.own, (_arm(a)[0], v == RISING)),
+        lambda a, v: a.device.triggering.set_arm(a.own, (_arm(a)[0], v == RISING)),
     ),
     "TRIGGER_SYNC_TYPE": fixed(NO_TRIGGER),
 }

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from dearig.sim_backend.clock import Clock
-from dearig.sim_backend.daqmx.card.device import Device
 from dearig.sim_backend.daqmx.card.tasks import Kind
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 
 __all__ = ["Clients"]
 
@@ -45,7 +45,7 @@ class Clients:
     0 V and the enable line low. A client that waits for an answer is not silent.
     """
 
-    def __init__(self, device: Device, clock: Clock, timeout: float) -> None:
+    def __init__(self, device: SimulatedCard, clock: Clock, timeout: float) -> None:
         self._device = device
         self._clock = clock
         self._timeout = timeout

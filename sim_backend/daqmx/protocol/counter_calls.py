@@ -48,7 +48,7 @@ class CounterCalls(Calls):
         counter = request.counter.rpartition("/")[2].lower()
         if not counter.startswith("ctr") or not counter[3:].isdigit() or int(counter[3:]) > 3:
             raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {request.counter}")
-        self._device.add_counter_input(
+        self._device.counters.add_input(
             self._task(request),
             request.counter,
             request.name_to_assign_to_channel,
@@ -262,13 +262,14 @@ class CounterCalls(Calls):
         samples = request.num_samps_per_chan
         if samples > room:
             raise DaqmxError(Code.READ_BUFFER_TOO_SMALL, f"Task Name: {task.name}", read=0)
-        return self._device.read_samples(task, samples, request.timeout, room)
+        reading = self._device.reader.read(task, samples, request.timeout, room)
+        return reading.values, reading.complete
 
     def _one(self, request: Any) -> np.ndarray:
-        values, complete = self._device.read_samples(self._input(request), 1, request.timeout)
-        if not complete:
+        reading = self._device.reader.read(self._input(request), 1, request.timeout)
+        if not reading.complete:
             raise DaqmxError(Code.SAMPLES_NOT_YET_AVAILABLE, read=0)
-        return values[:, 0]
+        return reading.values[:, 0]
 
     def _input(self, request: Any) -> Task:
         task = self._task(request)
@@ -299,7 +300,7 @@ class CounterCalls(Calls):
     def _add_output(self, request: Any, kind: int, pulse: Pulse, delay: float) -> None:
         if not delay >= 0.0:
             raise DaqmxError(Code.INVALID_VALUE, f"Property: initial delay; Value: {delay:g}")
-        self._device.add_counter_output(
+        self._device.counters.add_output(
             self._task(request),
             request.counter,
             request.name_to_assign_to_channel,
@@ -310,7 +311,9 @@ class CounterCalls(Calls):
         )
 
     def CfgImplicitTiming(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.set_implicit(self._task(request), is_finite(request), request.samps_per_chan)
+        self._device.timing.set_implicit(
+            self._task(request), is_finite(request), request.samps_per_chan
+        )
         return pb.CfgImplicitTimingResponse()
 
     # writing
@@ -355,7 +358,7 @@ class CounterCalls(Calls):
         return pb.WriteCtrTicksScalarResponse()
 
     def _write_pulses(self, request: Any, pulses: list[Pulse]) -> int:
-        return self._device.write_pulses(self._task(request), pulses, request.auto_start)
+        return self._device.counters.write(self._task(request), pulses, request.auto_start)
 
     def _write_one(self, request: Any, pulse: Pulse) -> None:
-        self._device.write_pulses(self._task(request), [pulse], request.auto_start)
+        self._device.counters.write(self._task(request), [pulse], request.auto_start)

@@ -56,7 +56,7 @@ class DigitalCalls(Calls):
     # reading lines
 
     def CreateDIChan(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.add_lines(
+        self._device.lines.add(
             self._task(request),
             request.lines,
             request.name_to_assign_to_lines,
@@ -66,7 +66,7 @@ class DigitalCalls(Calls):
         return pb.CreateDIChanResponse()
 
     def CreateDOChan(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.add_lines(
+        self._device.lines.add(
             self._task(request),
             request.lines,
             request.name_to_assign_to_lines,
@@ -138,7 +138,8 @@ class DigitalCalls(Calls):
         if task.kind is Kind.DO:
             held = [[self._device.line(line)] for line in task.line_names]
             return np.repeat(np.array(held, dtype=np.uint8), max(1, samples), axis=1), True
-        return self._device.read_samples(task, samples, timeout, most)
+        reading = self._device.reader.read(task, samples, timeout, most)
+        return reading.values, reading.complete
 
     def _of_lines(self, request: Any, kind: Kind = Kind.DI) -> Task:
         task = self._task(request)
@@ -203,7 +204,7 @@ class DigitalCalls(Calls):
         return response(samps_per_chan_written=written)
 
     def _write_levels(self, task: Task, levels: np.ndarray, request: Any) -> int:
-        return self._device.write_digital(task, levels, request.auto_start, request.timeout)
+        return self._device.lines.write(task, levels, request.auto_start, request.timeout)
 
     # waveforms
 
@@ -232,7 +233,7 @@ class DigitalCalls(Calls):
         """Return the times of the last ``samples`` of ``task`` on this computer's clock."""
         if task.clock is None:
             return Timing.create_with_no_interval(datetime.datetime.now(datetime.UTC))
-        start, interval = self._device.times_of_last(task, samples)
+        start, interval = self._device.lines.times_of_last(task, samples)
         return Timing.create_with_regular_interval(
             datetime.timedelta(seconds=interval),
             datetime.datetime.now(datetime.UTC) - datetime.timedelta(seconds=start),

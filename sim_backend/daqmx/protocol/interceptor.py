@@ -14,11 +14,11 @@ from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.message import DecodeError
 
 from dearig.sim_backend.clock import Clock
-from dearig.sim_backend.daqmx.card.device import Device
 from dearig.sim_backend.daqmx.card.errors import ERROR_TEXT, Code, DaqmxError
 from dearig.sim_backend.daqmx.card.tasks import Kind
 from dearig.sim_backend.daqmx.protocol.clients import Clients
 from dearig.sim_backend.daqmx.protocol.servicer import refuse
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.faults import FaultKind
 
 __all__ = ["THREADS", "Interceptor"]
@@ -76,7 +76,7 @@ class Interceptor(grpc.ServerInterceptor):
     """
 
     def __init__(
-        self, device: Device, clients: Clients | None, link: Clock, closing: threading.Event
+        self, device: SimulatedCard, clients: Clients | None, link: Clock, closing: threading.Event
     ) -> None:
         self._device = device
         self._clients = clients
@@ -167,7 +167,7 @@ class Interceptor(grpc.ServerInterceptor):
 
     def _freeze(self) -> None:
         """Hold a call while the server is frozen."""
-        fault = self._device.fault(FaultKind.SERVER_FROZEN)
+        fault = self._device.run.active(FaultKind.SERVER_FROZEN)
         if fault is None:
             return
         if fault.duration < math.inf:
@@ -177,7 +177,7 @@ class Interceptor(grpc.ServerInterceptor):
 
     def _delay(self) -> None:
         """Delay one reply."""
-        fault = self._device.fires(FaultKind.LATE_REPLY)
+        fault = self._device.run.fires(FaultKind.LATE_REPLY)
         if fault is not None:
             self._link.wait(self._link.now() + fault.duration, self._closing)
 

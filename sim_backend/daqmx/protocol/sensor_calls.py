@@ -129,7 +129,7 @@ class SensorCalls:
             request, "terminal_config", _DRIVER_CHOOSES
         )
         sensor = Sensor(usage, values, units)
-        self._device.add_inputs(
+        self._device.channels.add_inputs(
             self._task(request),
             request.physical_channel,
             request.name_to_assign_to_channel,

@@ -125,7 +125,7 @@ class DaqmxServer:
         while not self._closing.wait(_POLL_S):
             if self.clients is not None:
                 self.clients.check()
-            if self.device.fires(FaultKind.SERVER_GONE) is not None:
+            if self.device.run.fires(FaultKind.SERVER_GONE) is not None:
                 log.warning("fault: the server is gone")
                 self._server.stop(0)
                 if self.clients is not None:

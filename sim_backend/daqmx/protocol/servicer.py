@@ -18,7 +18,6 @@ from nidaqmx._stubs import nidaqmx_pb2_grpc as pb_grpc
 from session_pb2 import Session
 
 from dearig.drivers.channels import COUNT_MAX, COUNT_MIN
-from dearig.sim_backend.daqmx.card.device import Reading
 from dearig.sim_backend.daqmx.card.errors import ERROR_TEXT, Code, DaqmxError
 from dearig.sim_backend.daqmx.card.scales import (
     LINEAR,
@@ -40,6 +39,7 @@ from dearig.sim_backend.daqmx.protocol.sensor_calls import SensorCalls
 from dearig.sim_backend.daqmx.protocol.system_calls import SystemCalls
 from dearig.sim_backend.daqmx.protocol.trigger_calls import TriggerCalls
 from dearig.sim_backend.daqmx.protocol.waveform_calls import WaveformCalls
+from dearig.sim_backend.daqmx.running.reading import Reading
 from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 
 __all__ = ["Servicer", "refuse"]
@@ -87,22 +87,22 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         return pb.ClearTaskResponse()
 
     def StartTask(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.start(self._task(request))
+        self._device.states.start(self._task(request))
         return pb.StartTaskResponse()
 
     def StopTask(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.stop(self._task(request))
+        self._device.states.stop(self._task(request))
         return pb.StopTaskResponse()
 
     def TaskControl(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.control(self._task(request), request.action_raw or request.action)
+        self._device.states.control(self._task(request), request.action_raw or request.action)
         return pb.TaskControlResponse()
 
     def IsTaskDone(self, request: Any, context: grpc.ServicerContext) -> Any:
-        return pb.IsTaskDoneResponse(is_task_done=self._device.is_done(self._task(request)))
+        return pb.IsTaskDoneResponse(is_task_done=self._device.states.is_done(self._task(request)))
 
     def WaitUntilTaskDone(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.wait_done(self._task(request), request.time_to_wait)
+        self._device.states.wait_done(self._task(request), request.time_to_wait)
         return pb.WaitUntilTaskDoneResponse()
 
     def GetNthTaskChannel(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -114,7 +114,7 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
     # channels and timing
 
     def CreateAIVoltageChan(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.add_inputs(
+        self._device.channels.add_inputs(
             self._task(request),
             request.physical_channel,
             request.name_to_assign_to_channel,
@@ -125,7 +125,7 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         return pb.CreateAIVoltageChanResponse()
 
     def CreateAOVoltageChan(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.add_outputs(
+        self._device.channels.add_outputs(
             self._task(request),
             request.physical_channel,
             request.name_to_assign_to_channel,
@@ -136,7 +136,7 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
 
     def CfgSampClkTiming(self, request: Any, context: grpc.ServicerContext) -> Any:
         task = self._task(request)
-        self._device.set_clock(
+        self._device.timing.set_clock(
             task, request.rate, request.source, is_finite(request), request.samps_per_chan
         )
         edge = number(request, "active_edge")
@@ -145,11 +145,11 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
 
     def CfgDigEdgeStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
         edge = request.trigger_edge_raw or request.trigger_edge
-        self._device.set_trigger(self._task(request), request.trigger_source, edge)
+        self._device.triggering.set_start(self._task(request), request.trigger_source, edge)
         return pb.CfgDigEdgeStartTrigResponse()
 
     def DisableStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.set_trigger(self._task(request), "")
+        self._device.triggering.set_start(self._task(request), "")
         return pb.DisableStartTrigResponse()
 
     # custom scales
@@ -187,14 +187,14 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
 
     def SaveScale(self, request: Any, context: grpc.ServicerContext) -> Any:
         """Keep a scale in the list of saved ones, until the server ends."""
-        scale = self._device.scale(request.scale_name)
-        self._device.add_scale(
+        scale = self._device.scales.find(request.scale_name)
+        self._device.scales.add(
             replace(scale, name=request.save_as or scale.name, saved=True, author=request.author)
         )
         return pb.SaveScaleResponse()
 
     def DeleteSavedScale(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.remove_scale(request.scale_name)
+        self._device.scales.remove(request.scale_name)
         return pb.DeleteSavedScaleResponse()
 
     def CalculateReversePolyCoeff(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -210,7 +210,7 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
 
     def _add_scale(self, request: Any, kind: int, **fields: Any) -> None:
         units = request.pre_scaled_units_raw or request.pre_scaled_units
-        self._device.add_scale(
+        self._device.scales.add(
             Scale(
                 request.name,
                 kind,
@@ -225,7 +225,7 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
     def ReadAnalogF64(self, request: Any, context: grpc.ServicerContext) -> Any:
         task = self._task(request)
         reading = self._read(task, request, request.array_size_in_samps)
-        values = self._device.scaled(task, reading.counts)
+        values = self._device.inputs.scaled(task, reading.values)
         return pb.ReadAnalogF64Response(
             status=status(reading.complete),
             read_array=laid_out(values, request),
@@ -234,30 +234,30 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
 
     def ReadAnalogScalarF64(self, request: Any, context: grpc.ServicerContext) -> Any:
         task = self._task(request)
-        reading = self._device.read(task, 1, request.timeout)
+        reading = self._device.inputs.read(task, 1, request.timeout)
         if not reading.complete:
             raise DaqmxError(Code.SAMPLES_NOT_YET_AVAILABLE, read=0)
         return pb.ReadAnalogScalarF64Response(
-            value=float(self._device.scaled(task, reading.counts)[0, 0])
+            value=float(self._device.inputs.scaled(task, reading.values)[0, 0])
         )
 
     def ReadBinaryI16(self, request: Any, context: grpc.ServicerContext) -> Any:
         reading = self._read(self._task(request), request, request.array_size_in_samps)
         return pb.ReadBinaryI16Response(
             status=status(reading.complete),
-            read_array=laid_out(reading.counts, request),
-            samps_per_chan_read=reading.counts.shape[1],
+            read_array=laid_out(reading.values, request),
+            samps_per_chan_read=reading.values.shape[1],
         )
 
     def ReadRaw(self, request: Any, context: grpc.ServicerContext) -> Any:
         room = request.array_size_in_bytes // 2
         reading = self._read(self._task(request), request, room)
         # the card delivers scan after scan
-        scans = np.ascontiguousarray(reading.counts.T).tobytes()
+        scans = np.ascontiguousarray(reading.values.T).tobytes()
         return pb.ReadRawResponse(
             status=status(reading.complete),
             read_array=scans.ljust(request.array_size_in_bytes, b"\0"),
-            samps_read=reading.counts.shape[1],
+            samps_read=reading.values.shape[1],
             num_bytes_per_samp=2,
         )
 
@@ -267,7 +267,9 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         task = self._task(request)
         volts = self._to_write(task, request, np.float64)
         return pb.WriteAnalogF64Response(
-            samps_per_chan_written=self._write(task, self._device.to_counts(task, volts), request)
+            samps_per_chan_written=self._write(
+                task, self._device.outputs.to_counts(task, volts), request
+            )
         )
 
     def WriteAnalogScalarF64(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -275,7 +277,9 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         self._outputs(task)
         if len(task.outputs) != 1:
             raise DaqmxError(Code.INVALID_VALUE, "A single value is for a single channel.")
-        self._write(task, self._device.to_counts(task, np.array([[request.value]])), request)
+        self._write(
+            task, self._device.outputs.to_counts(task, np.array([[request.value]])), request
+        )
         return pb.WriteAnalogScalarF64Response()
 
     def WriteBinaryI16(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -312,12 +316,12 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         task = self._task(request)
         names = [name.strip() for name in request.channel_names.split(",")]
         for name, value in zip(names, request.expir_state_array, strict=True):
-            self._device.set_expiration(task, name, value)
+            self._device.watchdogs.set_expiration(task, name, value)
         return pb.CfgWatchdogDOExpirStatesResponse()
 
     def ControlWatchdogTask(self, request: Any, context: grpc.ServicerContext) -> Any:
         action = request.action_raw or request.action
-        self._device.control_watchdog(self._task(request), clear=action == 1)
+        self._device.watchdogs.control(self._task(request), clear=action == 1)
         return pb.ControlWatchdogTaskResponse()
 
     # events: each occupies a thread while a client listens
@@ -404,13 +408,13 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         samples, most = request.num_samps_per_chan, room // max(1, len(task.inputs))
         if samples > most:
             raise DaqmxError(Code.READ_BUFFER_TOO_SMALL, f"Task Name: {task.name}", read=0)
-        return self._device.read(task, samples, request.timeout, most)
+        return self._device.inputs.read(task, samples, request.timeout, most)
 
     def _scale(self, request: Any) -> Scale | None:
         """Return the custom scale of a new channel; None for V."""
         units, name = request.units_raw or request.units, request.custom_scale_name
         if units == FROM_CUSTOM_SCALE:
-            return self._device.scale(name)
+            return self._device.scales.find(name)
         if units != VOLTS:
             raise DaqmxError(Code.INVALID_VALUE, f"Requested Value: {units}; units of a voltage")
         if name:
@@ -433,7 +437,7 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         return values.reshape(rows, -1) if layout == BY_CHANNEL else values.reshape(-1, rows).T
 
     def _write(self, task: Task, counts: np.ndarray, request: Any) -> int:
-        return self._device.write(task, counts, request.auto_start, request.timeout)
+        return self._device.outputs.write(task, counts, request.auto_start, request.timeout)
 
 
 def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], Any] | None:

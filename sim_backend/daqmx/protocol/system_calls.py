@@ -10,7 +10,7 @@ import grpc
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError, message_of
-from dearig.sim_backend.daqmx.card.setup import LINES
+from dearig.sim_backend.daqmx.card.hardware import LINES
 from dearig.sim_backend.daqmx.card.tasks import HIGH, LOW, TRISTATE
 
 if TYPE_CHECKING:
@@ -70,14 +70,16 @@ class SystemCalls:
                 raise DaqmxError(
                     Code.INVALID_VALUE, f"Power Up State: {state}; Channel: {one.channel_names}"
                 )
-            for line in self._device.lines_of(one.channel_names):
-                self._device.kept["power up", line] = state
+            for line in self._device.levels.lines_of(one.channel_names):
+                self._device.state.kept["power up", line] = state
         return pb.SetDigitalPowerUpStatesResponse()
 
     def GetDigitalPowerUpStates(self, request: Any, context: grpc.ServicerContext) -> Any:
         self._device.check_device(request.device_name)
-        named = [line for name in request.channel_name for line in self._device.lines_of(name)]
-        kept, wanted = self._device.kept, named or list(LINES)
+        named = [
+            line for name in request.channel_name for line in self._device.levels.lines_of(name)
+        ]
+        kept, wanted = self._device.state.kept, named or list(LINES)
         return pb.GetDigitalPowerUpStatesResponse(
             power_up_states=[kept.get(("power up", line), TRISTATE) for line in wanted]
         )

@@ -10,7 +10,7 @@ import grpc
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import RISING
+from dearig.sim_backend.daqmx.card.tasks import RISING, physical_names
 from dearig.sim_backend.daqmx.card.triggers import Reference
 from dearig.sim_backend.daqmx.protocol.calls import Calls, number
 
@@ -22,7 +22,7 @@ class TriggerCalls(Calls):
 
     def CfgDigEdgeRefTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
         rising = number(request, "trigger_edge") == RISING
-        self._device.set_reference(
+        self._device.triggering.set_reference(
             self._task(request),
             Reference(request.trigger_source, rising, request.pretrigger_samples),
         )
@@ -30,7 +30,7 @@ class TriggerCalls(Calls):
 
     def CfgAnlgEdgeRefTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
         rising = number(request, "trigger_slope") == RISING
-        self._device.set_reference(
+        self._device.triggering.set_reference(
             self._task(request),
             Reference(
                 request.trigger_source, rising, request.pretrigger_samples, request.trigger_level
@@ -40,32 +40,32 @@ class TriggerCalls(Calls):
 
     def CfgAnlgEdgeStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
         rising = number(request, "trigger_slope") == RISING
-        self._device.set_reference(
+        self._device.triggering.set_reference(
             self._task(request),
             Reference(request.trigger_source, rising, 0, request.trigger_level, starts=True),
         )
         return pb.CfgAnlgEdgeStartTrigResponse()
 
     def DisableRefTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.set_reference(self._task(request), None)
+        self._device.triggering.set_reference(self._task(request), None)
         return pb.DisableRefTrigResponse()
 
     def ExportSignal(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.export(
+        self._device.routes.export(
             self._task(request), number(request, "signal_id"), request.output_terminal
         )
         return pb.ExportSignalResponse()
 
     def ConnectTerms(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.connect(request.source_terminal, request.destination_terminal)
+        self._device.routes.connect(request.source_terminal, request.destination_terminal)
         return pb.ConnectTermsResponse()
 
     def DisconnectTerms(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.disconnect(request.destination_terminal)
+        self._device.routes.disconnect(request.destination_terminal)
         return pb.DisconnectTermsResponse()
 
     def TristateOutputTerm(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.disconnect(request.output_terminal)
+        self._device.routes.disconnect(request.output_terminal)
         return pb.TristateOutputTermResponse()
 
     def ConfigureLogging(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -86,7 +86,7 @@ def _not_measured(name: str) -> Any:
             if name.startswith("CreateAO")
             else Code.NOT_MEASURED_BY_CHANNEL
         )
-        self._device.check_channel(channel)
+        physical_names(channel, self._device.name)
         raise DaqmxError(
             code, f"Physical Channel: {channel}; {name[6:]} is not simulated on this card."
         )

@@ -17,7 +17,7 @@ from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 
 if TYPE_CHECKING:
-    from dearig.sim_backend.daqmx.card.device import Reading
+    from dearig.sim_backend.daqmx.running.reading import Reading
     from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 
 __all__ = ["WaveformCalls", "check_channels"]
@@ -54,12 +54,11 @@ class WaveformCalls:
     def ReadAnalogWaveforms(self, request: Any, context: grpc.ServicerContext) -> Any:
         task = self._task(request)
         mode = request.waveform_attribute_mode_raw or request.waveform_attribute_mode
-        first = task.delivered if task.running else 0
-        reading = self._device.read(task, request.num_samps_per_chan, request.timeout)
-        start = self._device.time_of(task, first)
+        reading = self._device.inputs.read(task, request.num_samps_per_chan, request.timeout)
+        start = self._device.inputs.time_of(task, reading.first)
         waveforms = []
         for channel, values in zip(
-            task.inputs, self._device.scaled(task, reading.counts), strict=True
+            task.inputs, self._device.inputs.scaled(task, reading.values), strict=True
         ):
             waveform = DoubleAnalogWaveform(y_data=values)
             if mode & _TIMING:
@@ -73,7 +72,7 @@ class WaveformCalls:
         return pb.ReadAnalogWaveformsResponse(
             status=0 if reading.complete else int(Code.SAMPLES_NOT_YET_AVAILABLE),
             waveforms=waveforms,
-            samps_per_chan_read=reading.counts.shape[1],
+            samps_per_chan_read=reading.values.shape[1],
         )
 
     def WriteAnalogWaveforms(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -88,7 +87,7 @@ class WaveformCalls:
                 f"Waveforms of different numbers of samples. Task Name: {task.name}",
                 written=0,
             )
-        counts = self._device.to_counts(task, np.array(rows))
+        counts = self._device.outputs.to_counts(task, np.array(rows))
         return pb.WriteAnalogWaveformsResponse(
             samps_per_chan_written=self._write(task, counts, request)
         )
@@ -117,7 +116,7 @@ class WaveformCalls:
         """Return the fields of a reply with raw numbers; negative ones are those modulo 2^n."""
         room = request.array_size_in_samps
         reading = self._read(self._task(request), request, room)
-        values: np.ndarray = reading.counts.astype(kind)
+        values: np.ndarray = reading.values.astype(kind)
         laid = np.zeros(max(room, values.size), dtype=kind)
         by_channel = (request.fill_mode_raw or request.fill_mode) == 0
         laid[: values.size] = values.ravel() if by_channel else values.T.ravel()

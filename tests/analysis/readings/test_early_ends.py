@@ -10,7 +10,8 @@ import pytest
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.identify import identify_recordings
 from dearig.analysis.readings.early_ends import choose, early_end_warnings
-from dearig.analysis.readings.quality import few_data
+from dearig.analysis.readings.enough import few_data
+from dearig.analysis.readings.record import Readings
 from dearig.analysis.summary import read_entries, summary_of
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
@@ -61,7 +62,9 @@ def test_an_arc_is_told_with_its_time_and_what_it_means(folder):
     (entry,) = read_entries(folder, ["arc.h5"])
     assert early_end(summary_of(folder, entry)) == end
     assert early_end(open_recording(folder / "whole.h5")) is None
-    assert early_end_warnings([folder / "arc.h5", folder / "whole.h5"]) == (f"arc {end.sentence}",)
+    assert early_end_warnings([open_recording(folder / f"{n}.h5") for n in ("arc", "whole")]) == (
+        f"arc {end.sentence}",
+    )
 
 
 def test_cutting_leaves_out_what_may_show_the_fault(folder):
@@ -166,6 +169,6 @@ def test_every_way_to_end(run, kind, words):
 
 
 def test_enough_data_are_not_called_few(folder):
-    whole = [open_recording(folder / "whole.h5")]
+    whole = [Readings(open_recording(folder / "whole.h5"))]
     assert few_data(whole) == "3.99 s under voltage, 4 loadings"
     assert few_data(whole * 3) == ""

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise
-from dearig.analysis.readings.record import as_record, compare, noise_texts
+from dearig.analysis.readings.compare import compare
+from dearig.analysis.readings.record import Readings, noise_texts
 from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Network
 from dearig.model.simulation.actuator import Actuator
 from dearig.recording import RunMetadata, import_file, open_recording
@@ -59,11 +60,11 @@ def recorded(
 )
 def test_info_fits_and_comparisons_agree(tmp_path: Path, rest: float, source: str) -> None:
     run = recorded(tmp_path, rest)
-    told, compared = describe(run), compare(run, MODEL, "train")
-    assert told["noise_floor_m"] == as_record(run).noise == compared.noise
+    told, compared = describe(run), compare(Readings(run), MODEL, "train")
+    assert told["noise_floor_m"] == Readings(run).record.noise == compared.noise
     assert told["noise_floor_m"] == pytest.approx(NOISE, rel=0.2)
     assert told["noise_from"] == compared.noise_source == noise_from([compared]) == source
-    row, sentences = dict(describe_rows(run))["noise floor"], noise_texts([run])
+    row, sentences = dict(describe_rows(run))["noise floor"], noise_texts([Readings(run)])
     if source == "lead-in":
         assert "over 101 samples at 0 V" in row
         assert sentences == []
@@ -76,7 +77,7 @@ def test_info_fits_and_comparisons_agree(tmp_path: Path, rest: float, source: st
 def test_coarse_readings_tell_neither_noise_nor_zero_at_rest(tmp_path: Path, at: float) -> None:
     step = 6.0 * NOISE
     run = recorded(tmp_path, 2.0, travel=1e-2, step=step, at=at)
-    record, compared = as_record(run), compare(run, MODEL, "train")
+    record, compared = Readings(run).record, compare(Readings(run), MODEL, "train")
     assert record.noise == compared.noise == describe(run)["noise_floor_m"]
     assert record.noise == pytest.approx(np.hypot(NOISE, step / np.sqrt(12.0)), rel=0.15)
     # rounded alike, they are no 200 readings of the zero
@@ -89,27 +90,27 @@ def test_coarse_readings_tell_neither_noise_nor_zero_at_rest(tmp_path: Path, at:
     off = float(np.mean(record.displacement[moving] - true[moving]))
     # 200 readings of 4 um have a mean to 0.3 um, and the zero is known to a part of the noise
     assert abs(off) < 0.6 * NOISE
-    row, sentences = dict(describe_rows(run))["noise floor"], noise_texts([run])
+    row, sentences = dict(describe_rows(run))["noise floor"], noise_texts([Readings(run)])
     assert "in steps larger than their noise" in row
     assert "the zero of displacement is known to a part of a step only" in sentences[0]
 
 
 def test_what_moves_slowly_at_rest_is_said(tmp_path: Path) -> None:
     still = recorded(tmp_path, 2.0)
-    assert noise_texts([still]) == []
+    assert noise_texts([Readings(still)]) == []
     swinging = recorded(tmp_path, 2.0, swing=6.0 * NOISE)
-    (sentence,) = noise_texts([swinging])
+    (sentence,) = noise_texts([Readings(swinging)])
     # a swing of 12 um is 8.5 um RMS
     assert "the readings at rest move slowly, by 8." in sentence
     assert "in addition to a noise of 2." in sentence
-    assert compare(swinging, MODEL, "train").moves_at_rest
-    assert not compare(still, MODEL, "train").moves_at_rest
+    assert compare(Readings(swinging), MODEL, "train").moves_at_rest
+    assert not compare(Readings(still), MODEL, "train").moves_at_rest
 
 
 def test_readings_that_are_not_used_are_not_in_the_noise(tmp_path: Path) -> None:
     run = recorded(tmp_path, 1.0, dropout=True)
-    assert as_record(run).noise == compare(run, MODEL, "train").noise
-    assert as_record(run).noise == pytest.approx(NOISE, rel=0.2)
+    assert Readings(run).record.noise == compare(Readings(run), MODEL, "train").noise
+    assert Readings(run).record.noise == pytest.approx(NOISE, rel=0.2)
 
 
 def test_prose_table_and_json_give_one_noise_and_one_error() -> None:

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import check_apart
-from dearig.analysis.readings.quality import check_enough, extrapolated, inspect, overlap
-from dearig.analysis.readings.record import as_record, compare, recording_drive
+from dearig.analysis.readings.enough import check_enough, extrapolated, overlap
+from dearig.analysis.readings.record import Readings
 from dearig.errors import InputError
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator, Drive
@@ -70,19 +71,19 @@ def keep(tmp_path: Path) -> Callable[[Values], Recording]:
 class TestGood:
     def test_nothing_is_said_of_sound_recordings(self, keep):
         for values in (lobes(), cycles()):
-            look = inspect(keep(values))
+            look = Readings(keep(values)).quality
             assert look.valid is None
             assert look.findings == ()
 
     def test_nor_of_counts_that_repeat(self, tmp_path):
         write_run(tmp_path / "run.h5")
-        look = inspect(open_recording(tmp_path / "run.h5"))
+        look = Readings(open_recording(tmp_path / "run.h5")).quality
         assert (look.valid, look.findings) == (None, ())
 
     def test_coarse_steps_are_not_a_stuck_sensor(self, keep):
         values = lobes()
         values["displacement"] = np.round(values["displacement"] / 20e-6) * 20e-6
-        assert inspect(keep(values)).valid is None
+        assert Readings(keep(values)).quality.valid is None
 
     def test_a_step_of_the_voltage_is_not_a_dropout(self, keep):
         values = lobes()
@@ -91,7 +92,7 @@ class TestGood:
         values["voltage_command"][1000:] = 3e3
         still = np.random.default_rng(3).normal(0.0, NOISE, on.size)
         values["displacement"] = 0.4e-3 * on + 0.1e-3 * (values["time"] >= 4.0) + still
-        assert inspect(keep(values)).valid is None
+        assert Readings(keep(values)).quality.valid is None
 
 
 class TestMasks:
@@ -100,7 +101,7 @@ class TestMasks:
         clipped = values["displacement"] > 0.4e-3
         values["displacement"] = np.minimum(values["displacement"], 0.4e-3)
         recording = keep(values)
-        look = inspect(recording)
+        look = Readings(recording).quality
         assert not look.valid[clipped].any()
         # a small margin, and nothing else
         assert np.count_nonzero(~look.valid) <= np.count_nonzero(clipped) + 4 * 6
@@ -112,7 +113,7 @@ class TestMasks:
     def test_a_stuck_sensor(self, keep):
         values = lobes()
         values["displacement"][600:700] = values["displacement"][600]
-        look = inspect(keep(values))
+        look = Readings(keep(values)).quality
         assert not look.valid[600:700].any()
         assert look.valid[:597].all()
         assert look.valid[703:].all()
@@ -128,7 +129,7 @@ class TestMasks:
         rows = np.round(at * RATE).astype(int)
         for row in rows:
             values["displacement"][row : row + length] = reading
-        look = inspect(keep(values))
+        look = Readings(keep(values)).quality
         for row in rows:
             assert not look.valid[row : row + length].any()
         assert np.count_nonzero(~look.valid) <= 3 * (length + 4)
@@ -139,14 +140,14 @@ class TestMasks:
         values = cycles()
         values["nominal_stress"][450] = 0.0
         values["nominal_stress"][640] = 5e6
-        look = inspect(keep(values))
+        look = Readings(keep(values)).quality
         assert not look.valid[[450, 640]].any()
         assert "kPa from sample 450" in look.findings[0]
 
     def test_records_carry_the_mask_and_a_line_across_it(self, keep):
         values = lobes()
         values["displacement"][700] = 10e-3
-        record = as_record(keep(values))
+        record = Readings(keep(values)).record
         assert not record.valid[698:703].any()
         assert record.valid[:698].all()
         assert abs(record.measured[700] - values["displacement"][698]) < 50e-6
@@ -155,9 +156,9 @@ class TestMasks:
     def test_a_comparison_leaves_them_out_of_its_errors(self, keep):
         values = lobes()
         model = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
-        sound = compare(keep(values), model, "validation")
+        sound = compare(Readings(keep(values)), model, "validation")
         values["displacement"][700] = 10e-3
-        masked = compare(keep(values), model, "validation")
+        masked = compare(Readings(keep(values)), model, "validation")
         assert masked.errors.max == pytest.approx(sound.errors.max, rel=1e-6)
         assert masked.errors.samples == sound.errors.samples - 5
         assert np.isnan(masked.measured[698:703]).all()
@@ -174,8 +175,8 @@ class TestMasks:
         values["displacement"][300] += 30e-6
         assert np.ptp(np.diff(moved, 2)[280:320]) > 10.0 * NOISE
         recording = keep(values)
-        assert inspect(recording).valid is None
-        compared = compare(recording, model, "validation")
+        assert Readings(recording).quality.valid is None
+        compared = compare(Readings(recording), model, "validation")
         assert np.flatnonzero(np.isnan(compared.measured)).tolist() == [300]
         assert "a single reading is far off the model" in compared.warnings[-1]
         assert compared.errors.rms < 1.2 * NOISE
@@ -184,14 +185,14 @@ class TestMasks:
         values = lobes()
         values["displacement"][400:2300] = 0.1e-3
         with pytest.raises(InputError, match=r"stuck.*less than half of it is usable"):
-            inspect(keep(values))
+            _ = Readings(keep(values)).quality
 
 
 class TestGaps:
     def test_at_rest_a_gap_is_told(self, keep):
         values = lobes()
         values["time"][100:] += 3.0
-        look = inspect(keep(values))
+        look = Readings(keep(values)).quality
         assert "time jumps by 3.004 s after sample 99 (0.396 s)" in look.findings[0]
         assert look.valid is None
 
@@ -199,13 +200,13 @@ class TestGaps:
         values = lobes()
         values["time"][400:] += 3.0
         with pytest.raises(InputError, match=r"jumps by 3\.004 s after sample 399.*not known"):
-            inspect(keep(values))
+            _ = Readings(keep(values)).quality
 
     def test_a_change_of_rate_is_no_gap(self, keep):
         values = cycles()
         slow = values["time"] > 20.0
         values["time"] = np.cumsum(np.where(slow, 0.4, 0.04))
-        assert inspect(keep(values)).findings == ()
+        assert Readings(keep(values)).quality.findings == ()
 
 
 def scaled(values: Values, name: str, factor: float) -> Values:
@@ -278,13 +279,13 @@ def test_what_cannot_be_meant_is_refused_in_words(tmp_path, case, command):
 class TestTooShort:
     def test_seconds(self, keep):
         with pytest.raises(InputError, match=r"1\.9\d* s and 4\d\d samples .* too few"):
-            check_enough([keep(lobes(seconds=3.0))])
-        check_enough([keep(lobes(seconds=6.0))])
+            check_enough([Readings(keep(lobes(seconds=3.0)))])
+        check_enough([Readings(keep(lobes(seconds=6.0)))])
 
     def test_film(self, keep):
         short = {name: values[:80] for name, values in cycles().items()}
         with pytest.raises(InputError, match="80 samples are too few"):
-            check_enough([keep(short)])
+            check_enough([Readings(keep(short))])
 
 
 class TestOverlap:
@@ -325,35 +326,35 @@ class TestThermometer:
     def test_warmth_is_above_the_first_second(self, keep):
         values = lobes()
         values["temperature"] = 21.0 + 0.1 * np.maximum(values["time"] - 1.0, 0.0)
-        drive = recording_drive(keep(values), "command")
+        drive = Readings(keep(values)).voltage
         assert np.abs(drive.warmth[:120]).max() < 1e-12  # a mean over a second
         assert drive.warmth[-1] == pytest.approx(0.1 * (values["time"][-1] - 1.0), abs=0.02)
 
     def test_without_one_there_is_none(self, keep):
-        assert recording_drive(keep(lobes()), "command").warmth is None
+        assert Readings(keep(lobes())).voltage.warmth is None
 
 
 class TestWhatGoesBeyondTheTraining:
     def test_a_like_run_does_not(self, tmp_path):
-        train = saved(tmp_path / "train.h5", lobes())
-        assert extrapolated([train], [saved(tmp_path / "other.h5", lobes(1))]) == ()
+        train = Readings(saved(tmp_path / "train.h5", lobes()))
+        assert extrapolated([train], [Readings(saved(tmp_path / "other.h5", lobes(1)))]) == ()
 
     def test_higher_and_longer_ones_do(self, tmp_path):
-        train = saved(tmp_path / "train.h5", lobes(seconds=4.0))
+        train = Readings(saved(tmp_path / "train.h5", lobes(seconds=4.0)))
         higher = lobes(1)
         higher["voltage_command"] = 1.2 * higher["voltage_command"]
         higher["displacement"] = 1.44 * higher["displacement"]
-        long = saved(tmp_path / "long.h5", lobes(2, seconds=20.0))
-        said = extrapolated([train], [saved(tmp_path / "higher.h5", higher), long])
+        long = Readings(saved(tmp_path / "long.h5", lobes(2, seconds=20.0)))
+        said = extrapolated([train], [Readings(saved(tmp_path / "higher.h5", higher)), long])
         assert len(said) == 2
         assert "7.2 kV, those that were fitted to 6 kV" in said[0]
         assert "lasts" not in said[0]
         assert "lasts 20 s, those that were fitted 4 s at most" in said[1]
 
     def test_a_film_that_is_stretched_further_does(self, tmp_path):
-        train = saved(tmp_path / "train.h5", cycles())
+        train = Readings(saved(tmp_path / "train.h5", cycles()))
         further = cycles(1)
         further["stretch"] = 1.0 + 2.0 * (further["stretch"] - 1.0)
-        (said,) = extrapolated([train], [saved(tmp_path / "further.h5", further)])
+        (said,) = extrapolated([train], [Readings(saved(tmp_path / "further.h5", further))])
         assert said.startswith("further goes to a stretch of 3, those that were fitted to 2")
         assert said.endswith("its error is extrapolated")

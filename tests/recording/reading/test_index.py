@@ -48,14 +48,17 @@ def test_what_lies_in_a_folder(shelf: Path, tmp_path: Path) -> None:
     assert (run.kind, run.title, run.samples, run.duration_s) == (
         "actuator", "two lobes", 3000, 2.999,
     )  # fmt: skip
-    assert (run.complete, run.rig, run.film_id, run.operator) == (True, "sim:7", "film 3", "Ada")
+    assert run.complete
+    assert run.texts == {
+        "film_id": "film 3", "rig": "sim:7", "operator": "Ada", "notes": "second day",
+    }  # fmt: skip
     assert run.start_time.startswith("2027-01-15T08:00:00")
     with h5py.File(shelf / run.path) as file:
         data = file["entry/data"]
         for name in ("voltage_command", "displacement"):
             values = data[name][()]
             assert run.peaks[name] == pytest.approx(values[np.argmax(np.abs(values))], rel=1e-9)
-    assert (run.notes, run.identifier != "") == ("second day", True)
+    assert run.identifier
     assert len(run.outline) == 4 * OUTLINE
     assert set(found["film.h5"].peaks) == {"stretch", "nominal_stress"}
     assert run.bytes == (shelf / run.path).stat().st_size
@@ -122,7 +125,7 @@ def test_the_command(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert told[0].startswith("not read")
     assert told[2] == (
         f"{local_time('2027-01-15T08:00:00+00:00')}     2.999 s  day 1/run.h5: two lobes, "
-        f"6.1 kV, 11 mm, sim:7, film 3, Ada"
+        f"6.1 kV, 11 mm, film 3, sim:7, Ada"
     )
     assert told[3].endswith("INCOMPLETE: killed, or still running")
     assert dearig("index", tmp_path / "no").code == 2

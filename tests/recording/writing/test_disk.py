@@ -41,7 +41,7 @@ def test_the_estimate_is_near_the_file(
 ) -> None:
     if long:
         for module in ("finish", "disk_space"):
-            monkeypatch.setattr(f"dearig.recording.{module}.PHYSICAL_MAX", 1000)
+            monkeypatch.setattr(f"dearig.recording.writing.{module}.PHYSICAL_MAX", 1000)
     path = tmp_path / "run.h5"
     write_run(path, run_counts(samples), block=10_000)
     size = path.stat().st_size

@@ -254,6 +254,36 @@ class TestHeadline:
         worse = replace(clean, stands=(clean.after, clean.before))
         assert "the error rises from" in " ".join(summary(worse))
 
+    def test_what_does_not_help_on_untouched_recordings_is_not_named(self):
+        clean = left("explained", 6.1, steps=(SURE,))
+        for rises in (False, True):
+            worse = tuple(
+                replace(c, errors=replace(c.errors, rms=(1.3 if rises else 1.0) * c.errors.rms))
+                for c in clean.before.validation
+            )
+            after = replace(clean.after, validation=worse)
+            gain = -300.0 if rises else 0.0
+            outcome = replace(clean, stands=(clean.before, after), gain=gain)
+            assert outcome.verdict == "not_confirmed"
+            assert not outcome.recommends_final
+            assert headline(outcome) == HEADLINES["not_confirmed"]
+            told = " ".join(summary(outcome))
+            assert "no effect is named" in told
+            assert "is that without it" in told
+            found = diagnosis_json(outcome)
+            assert (found["verdict"], found["recommended"]) == ("not_confirmed", "baseline")
+            assert found["families"][0] == {"family": "unknown", "probability": 1.0}
+
+    def test_a_model_that_cannot_follow_an_untouched_recording_is_not_recommended(self):
+        clean = diagnose_outcome(finding=finding(steps=(SURE,)))
+        first = clean.after.validation[0]
+        outcome = replace(
+            clean, not_compared=(first.name,), gain=-math.inf,
+            stands=(clean.before, replace(clean.after, validation=clean.after.validation[1:])),
+        )  # fmt: skip
+        assert outcome.verdict == "not_confirmed"
+        assert not outcome.recommends_final
+
     def test_a_rising_cross_validation_error_is_said(self):
         stage = finding().final
         worse = replace(stage, selection_rms=72e-6)

@@ -298,7 +298,7 @@ def test_events_that_nobody_hears_do_not_pile_up() -> None:
 def test_the_card_remembers_a_bounded_past(card: Served, output: nidaqmx.Task) -> None:
     there = card.device.task(output.name)
     for place in range(100_100):
-        card.device._wire.set_output("ao0", place % 2 * 1000, 0.0)
+        card.device.wire.set_output("ao0", place % 2 * 1000, 0.0)
     assert len(card.device.history()) == 100_000
     assert there.name
 

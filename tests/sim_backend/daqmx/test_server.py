@@ -95,7 +95,7 @@ def test_rates_and_delays_are_what_the_timebase_makes_of_them(output, inputs):
     clock_output(output, 997.0, 100)
     assert output.timing.samp_clk_rate == 1e8 / 100301
     clock_inputs(inputs, 997.0, 100, source="")
-    assert inputs.timing.samp_clk_rate == 1e8 / 100301
+    assert inputs.timing.samp_clk_rate == 1e8 / 100300  # NI truncates the divisor of an input
     inputs.timing.ai_conv_rate = 150e3
     assert inputs.timing.ai_conv_rate == 1e8 / 667
     inputs.timing.delay_from_samp_clk_delay = 12.3456e-6
@@ -288,11 +288,11 @@ def test_regeneration_repeats_what_was_written(card, output):
     seen = []
     for _ in range(6):
         seen.append(card.device.output_voltage())
-        card.device._clock.advance(0.001)
+        card.device.state.clock.advance(0.001)
     assert np.allclose(seen, [1.0, 2.0, 3.0, 4.0, 1.0, 2.0], atol=1e-3)
     assert output.out_stream.total_samp_per_chan_generated == 6
     output.write(np.array([7.0]), auto_start=False)
-    card.device._clock.advance(0.002)  # tick 8 is the first place of the buffer
+    card.device.state.clock.advance(0.002)  # tick 8 is the first place of the buffer
     assert card.device.output_voltage() == pytest.approx(7.0, abs=1e-3)
 
 
@@ -372,7 +372,7 @@ def test_what_came_before_a_timeout_is_delivered(session, output, inputs):
 def test_what_a_late_reader_lost_is_an_error_until_the_task_is_stopped(card, inputs):
     clock_inputs(inputs, RATE, source="", buffer=1000)
     inputs.start()
-    card.device._clock.advance(1.5)
+    card.device.state.clock.advance(1.5)
     for _ in range(2):
         with pytest.raises(DaqReadError) as caught:
             read(inputs, 10)
@@ -422,7 +422,7 @@ def test_the_output_keeps_its_value_when_its_task_ends(card, session):
         ao.write(volts(waveform))
         assert card.device.wire_voltage() == pytest.approx(6000.0, abs=0.2)
         ao.start()
-        card.device._clock.advance(0.0955)
+        card.device.state.clock.advance(0.0955)
     assert card.device.wire_voltage() == pytest.approx(waveform.window()[95], abs=0.2)
 
 
@@ -481,7 +481,7 @@ def test_a_done_event_comes_when_it_is_done(card, output):
     output.write(np.zeros(100))
     output.start()
     assert not done.is_set()
-    card.device._clock.advance(0.2)
+    card.device.state.clock.advance(0.2)
     assert done.wait(30.0)
     assert told == [0]
     output.stop()
@@ -493,7 +493,7 @@ def test_every_n_samples_an_event_comes(card, inputs):
     inputs.register_every_n_samples_acquired_into_buffer_event(100, lambda *_: three.release() or 0)
     clock_inputs(inputs, RATE, source="")
     inputs.start()
-    card.device._clock.advance(0.35)
+    card.device.state.clock.advance(0.35)
     for _ in range(3):
         assert three.acquire(timeout=30.0)
     assert not three.acquire(blocking=False)

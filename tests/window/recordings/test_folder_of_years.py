@@ -41,8 +41,7 @@ def entry(folder: Path, number: int, **said: object) -> RecordingSummary:
         "name": f"run-{number:04d}",
         "kind": "actuator",
         "title": "lobes",
-        "film": f"film {number % 3}",
-        "operator": ("Ada", "Grace")[number % 2],
+        "texts": {"film_id": f"film {number % 3}", "operator": ("Ada", "Grace")[number % 2]},
         "started": f"2025-{1 + number // 28 % 12:02d}-{1 + number % 28:02d}T09:00:00+00:00",
         "duration": 2.0 + number % 7,
         "outcome": "finished",
@@ -88,7 +87,7 @@ def test_numbers_are_sorted_as_numbers_and_what_has_none_comes_last(session: Ses
 
 def test_a_search_looks_through_every_column_also_hidden_ones_and_notes(session: Session) -> None:
     model = listed(session, 203)
-    hidden = replace(entry(session.folder, 7), notes="new GREASE on the rail", tags=("kept",))
+    hidden = entry(session.folder, 7, texts={"notes": "new GREASE on the rail"}, tags=("kept",))
     ended = replace(entry(session.folder, 8), outcome="stopped by an interlock: over current")
     for summary in (hidden, ended):
         model.set_summary(summary)
@@ -307,7 +306,7 @@ def test_a_trend_has_a_point_for_each_run_of_a_film_that_selects_it(
 def test_names_of_films_are_no_markup(session: Session, qtbot: QtBot) -> None:
     plot = TrendPlot(session)
     qtbot.addWidget(plot)
-    plot.show_summaries([replace(entry(session.folder, 1), film="<b>x</b>")])
+    plot.show_summaries([entry(session.folder, 1, texts={"film_id": "<b>x</b>"})])
     assert "<b>x</b>" in plot.film.itemText(1)
 
 

@@ -7,11 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from dearig.model.film.specimen import Film
+from dearig.recording.content.bounds import (
+    CURRENT,
+    DISPLACEMENT_SPAN,
+    STRESS,
+    STRETCH,
+    TEMPERATURE,
+    VOLTAGE,
+)
 
 __all__ = ["doubts"]
 
-#: Largest free length of an actuator film on a bench, m; used where the film is not known.
-LONGEST_FILM = 0.5
 #: Correlation of displacement and squared voltage beyond which the sign is sure. It is 0.7 to 1 for
 #: films with creep, friction or drift under sines, lobes and chirps, and near 0 for noise alone.
 SIGN_SURE = 0.5
@@ -56,7 +62,7 @@ def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
     if "displacement" in values:
         span = _span(values["displacement"])
         longest, whose = (
-            (film.length, "the film is") if film else (LONGEST_FILM, "a film is hardly")
+            (film.length, "the film is") if film else (DISPLACEMENT_SPAN.high, "a film is hardly")
         )
         check(
             "displacement",
@@ -66,7 +72,7 @@ def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
         )
         check(
             "displacement",
-            span < 1e-7,
+            span < DISPLACEMENT_SPAN.low,
             f"displacement spans {span * 1e6:.4g} um only; is its unit right?",
         )
     if {"displacement", "voltage_command"} <= values.keys():
@@ -81,20 +87,20 @@ def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
         highest = _largest(values["voltage_command"])
         check(
             "voltage_command",
-            highest > 30e3,
+            highest > VOLTAGE.usual.high,
             f"voltage reaches {highest * 1e-3:.4g} kV; is it in V and not in kV?",
         )
         check("voltage_command", highest == 0.0, "voltage never leaves 0 V")
         check(
             "voltage_command",
-            0.0 < highest < 30.0,
+            0.0 < highest < VOLTAGE.usual.low,
             f"voltage reaches {highest:.4g} V only; is it in kV?",
         )
     if "current_monitor" in values:
         highest = _largest(values["current_monitor"])
         check(
             "current_monitor",
-            highest > 1.0,
+            highest > CURRENT.high,
             f"current reaches {highest:.4g} A, which no high-voltage amplifier gives; "
             f"is its unit right?",
         )
@@ -102,14 +108,14 @@ def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
         low, high = float(values["temperature"].min()), float(values["temperature"].max())
         check(
             "temperature",
-            low < -100.0 or high > 150.0,
+            low < TEMPERATURE.low or high > TEMPERATURE.high,
             f"temperature lies between {low:.4g} and {high:.4g} degC; is its unit right?",
         )
     if "stretch" in values:
         low, high = float(values["stretch"].min()), float(values["stretch"].max())
         check(
             "stretch",
-            low < 0.2 or high > 15.0,
+            low < STRETCH.usual.low or high > STRETCH.usual.high,
             f"stretch lies between {low:.4g} and {high:.4g}; is it length over length at rest, "
             f"and the gauge length right?",
         )
@@ -118,7 +124,7 @@ def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
         highest = _largest(values["nominal_stress"])
         check(
             "nominal_stress",
-            highest > 1e8 or 0.0 < highest < 10.0,
+            highest > 0.0 and highest not in STRESS,
             f"nominal stress reaches {highest * 1e-3:.4g} kPa; are its unit and the area right?",
         )
     return found

@@ -1,0 +1,1 @@
+"""Analog inputs and outputs: one run of the simulated rig."""

@@ -1,0 +1,1 @@
+"""What holds for tasks of every kind while they run: states, buffers, events."""

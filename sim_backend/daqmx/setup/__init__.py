@@ -1,0 +1,1 @@
+"""Set-up of the card: channels, timing, triggers, routes, and the checks of each."""
