@@ -140,8 +140,7 @@ def play(folder: Path, port: int, picture: str) -> None:
             write(controls.seen, "fine")
         until(lambda: controls.arm.isEnabled() and controls.arm.answers, "the batch can be armed")
         click(controls.arm)
-        start = controls.start
-        until(lambda: start.isEnabled() and start.answers, "ARMED was seen")
+        until(lambda: controls.start.isEnabled() and controls.start.answers, "ARMED was seen")
         click(controls.start)
         until(lambda: window.run_page.runner.running, "started")
         print(json.dumps({"at": "started"}), flush=True)
