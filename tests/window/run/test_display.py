@@ -103,6 +103,7 @@ def test_start_is_refused_where_other_curves_are_drawn_than_would_be_played(
     assert preview is not None
     run_page.session.preview = replace(preview, loaded=other.loaded)
     press(qtbot, run_page.arm_button)
+    qtbot.waitUntil(lambda: run_page.runner.status.may_start)
     with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):
         run_page.start()
     assert run_page.result.text().startswith("Refused")
