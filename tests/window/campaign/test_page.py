@@ -24,6 +24,7 @@ from dearig.recording import open_recording
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.campaign.compute import ComputeProcess
 from dearig.window.campaign.page import CampaignPage
+from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.jobs.worker_process import Response
 from dearig.window.run.runner import Play, Runner
@@ -59,7 +60,7 @@ def runner(session: Session) -> Iterator[Runner]:
     session.set_rig_file(None, "", RIG)
     made = Runner(session, session)
     yield made
-    made.stop()
+    made.stop("the end of a test")
     made.wait()
 
 
@@ -67,7 +68,9 @@ def runner(session: Session) -> Iterator[Runner]:
 def page(
     session: Session, runner: Runner, keep: Callable[[QWidget], None], tmp_path: Path, qtbot: QtBot
 ) -> CampaignPage:
-    """The page alone, with three short runs that are within all limits."""
+    """The page alone, with three short runs that are within all limits, and the bar."""
+    bar = HighVoltageBar(runner.status, session)  # where ARMED is seen
+    keep(bar)
     (tmp_path / "lobe.toml").write_text(LOBE, "utf-8")
     shown = CampaignPage(session, runner)
     write(shown, PLAN, tmp_path)
