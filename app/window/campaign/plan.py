@@ -17,7 +17,8 @@ from dearig.config.campaignfile import EXAMPLE, Campaign, parse_campaign
 from dearig.config.rigfile import RigFile
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError, Interrupted
-from dearig.progress import Progress
+from dearig.progress import Progress, quiet
+from dearig.report.pages.campaign import write_campaign_report
 from dearig.window.documents.toml_editor import EditorWords, TomlEditor
 from dearig.window.jobs.background import Background
 from dearig.window.session.state import Session
@@ -29,6 +30,7 @@ __all__ = [
     "Surveyor",
     "open_campaign",
     "with_requests",
+    "write_report",
 ]
 
 _WAIT = 400  # ms after a change of the text, before it is surveyed
@@ -102,6 +104,12 @@ class OpenedCampaign:
     queue: Queue
     status: str
     reason: str
+
+
+def write_report(folder: Path, progress: Progress = quiet) -> Path:
+    """Write the report of the campaign in ``folder`` beside its journal."""
+    progress("writing the report", 0.0)
+    return write_campaign_report(seen(folder), folder / "report.html")
 
 
 def open_campaign(folder: Path) -> OpenedCampaign:

@@ -52,6 +52,7 @@ class RunPage(Page):
         self.live: Live | None = None
         self._played_hold: HoldPlan | None = None  # of the run that is shown
         self._runs = 0
+        self._watched, self._watched_over = "", False  # name of a campaign's run that is shown
         self._run_number = -1  # of the status, for ``live``
         self._segments: tuple[tuple[str, float, float], ...] = ()
         self._last_recording: Path | None = None
@@ -94,8 +95,7 @@ class RunPage(Page):
         )  # fmt: skip
         if not self.runner.start(request, live):
             return
-        if self.live is not None:
-            self.live.close()
+        self._drop_live()
         self.live, self._segments = live, preview.segments
         self._run_number = self.runner.status.run_number
         self._played_hold = session.hold
@@ -106,6 +106,31 @@ class RunPage(Page):
         self.started.emit(live)
         session.set_running(True)
         self._refresh()
+
+    @Slot(object, str)
+    def watch(self, live: Live, name: str) -> None:
+        """Show a run of a campaign, which ``live`` looks on at and the campaign closes."""
+        self._end_watched("Ended", "the next run of the campaign has begun")
+        self._drop_live()
+        self.live, self._watched, self._segments = live, name, ()
+        self._run_number = self.runner.status.run_number
+        self._played_hold = None
+        self.display.begin(live, None, name, None)
+        self._forget_result()
+        self._numbers.start()
+
+    def _end_watched(self, headline: str, sentence: str, level: str = "info") -> None:
+        """Show the end of a campaign's run, if one is shown that goes on."""
+        if self._watched and not self._watched_over:
+            self._watched_over = True
+            self._update_readouts()
+            self.display.end(headline, f"{self._watched}: {sentence}", level)
+
+    def _drop_live(self) -> None:
+        """Look on at no run any more; that of a campaign is closed by the campaign."""
+        if self.live is not None and not self._watched:
+            self.live.close()
+        self.live, self._watched, self._watched_over = None, "", False
 
     def _refuse_unseen(self) -> None:
         """Disarm: what would be played is not what the plots show."""
@@ -133,9 +158,7 @@ class RunPage(Page):
         self._numbers.stop()
         self.display.forget_run()
         self.overlays.close_work()
-        if self.live is not None:
-            self.live.close()
-            self.live = None
+        self._drop_live()
 
     @Slot(bool)
     def _arm(self, armed: bool) -> None:
@@ -153,7 +176,8 @@ class RunPage(Page):
             self.display.show_planned()
             self._played_hold = None
         elif state is HighVoltage.BETWEEN:
-            self._forget_result()  # a campaign has begun
+            self._forget_result()  # a campaign goes on
+            self._end_watched("Ended", self.runner.status.words)
         elif self.runner.playing is Play.RUN and not self.runner.status.live:
             self.display.view.ending()
         self._refresh()
@@ -250,6 +274,7 @@ class RunPage(Page):
     @Slot(object)
     def _run_ended(self, end: RunEnd) -> None:
         if end.play is not Play.RUN:
+            self._end_watched(end.headline, end.sentence, _end_level(end))
             self._refresh()
             return
         self._update_readouts()

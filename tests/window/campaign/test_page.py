@@ -144,6 +144,36 @@ def test_a_batch_is_foreseen_armed_and_played_as_by_the_command(
     assert page.controls.blocked.text() == "No run waits."
 
 
+def test_the_present_run_is_shown_live_on_its_page_and_on_run(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    """Its curves and numbers, with the overlay models, as those of any run."""
+    window.session.set_rig_file(None, "", RIG)
+    page, run = window.page(CampaignPage), window.run_page
+    (tmp_path / "lobe.toml").write_text(LOBE, "utf-8")
+    write(page, PLAN, tmp_path)
+    window.show_page(page)
+    surveyed(qtbot, page)
+    page.controls.operator.setText("Ada")
+    page.controls.paced.setChecked(True)
+    begin(qtbot, page)
+    plots = page.present_run.plots
+    qtbot.waitUntil(lambda: plots.curve("displacement")[0].size > 100, timeout=_PATIENCE)
+    assert page.present_run.isVisible()
+    assert page.controls.numbers["displacement"].text != "—"
+    window.show_page(run)
+    qtbot.waitUntil(lambda: run.plots.curve("model 0")[0].size > 100, timeout=_PATIENCE)
+    words = run.display.view.words
+    assert words.text() in [f"Running: {name}" for name in NAMES]
+    qtbot.waitUntil(lambda: run.controls.numbers["rms 0"].text != "—", timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: words.text() == f"Running: {NAMES[2]}", timeout=_PATIENCE)
+    ended(qtbot, run.runner)
+    assert words.text().startswith(f"Last run: {NAMES[2]}, ended at ")
+    assert page.controls.numbers["displacement"].text == "—"
+    started = [a.message for a in run.alarms.alarms if "run started" in a.message]
+    assert started == [f"{name}: run started" for name in NAMES]
+
+
 def test_what_is_refused_stands_in_the_table_and_nothing_can_be_armed(
     qtbot: QtBot, page: CampaignPage, tmp_path: Path
 ) -> None:

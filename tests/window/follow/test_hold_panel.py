@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import RigFile
-from dearig.config.targetfile import EXAMPLE
 from dearig.drivers.settings import CardSettings, LimitsSettings
 from dearig.errors import InputError
 from dearig.recording import open_recording
@@ -144,7 +143,7 @@ def test_any_change_of_what_is_played_removes_the_feedback(
 def test_what_cannot_be_held_is_said_before_anything_is_played(
     qtbot: QtBot, page: FollowPage, session: Session
 ) -> None:
-    panel = page.hold
+    panel, target = page.hold, page.target.toml
     panel.displacement.setValue(20.0)
     click(qtbot, panel.check_button)
     idle(qtbot, page)
@@ -157,4 +156,4 @@ def test_what_cannot_be_held_is_said_before_anything_is_played(
     click(qtbot, panel.check_button)
     idle(qtbot, page)
     assert "time at 1 kV or more" in panel.message.text()
-    assert page.target.toml == EXAMPLE  # the other mode is as it was
+    assert page.target.toml == target  # the other mode is as it was
