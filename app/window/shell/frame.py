@@ -449,6 +449,10 @@ class MainWindow(QMainWindow):
 class _Stack(QStackedWidget):
     """Pages of which each needs no more room than it has itself."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.currentChanged.connect(self.updateGeometry)
+
     def minimumSizeHint(self) -> QSize:  # noqa: N802
         shown = self.currentWidget()
         return super().minimumSizeHint() if shown is None else shown.minimumSizeHint()

@@ -161,7 +161,7 @@ class StudyPage(Page):
         inner.addWidget(self.bar)
         inner.addWidget(self.stage)
         frame = card(inner)
-        frame.setMinimumWidth(280)
+        frame.setMinimumWidth(frame.minimumSizeHint().width())
         return frame
 
     def _make_results(self) -> QWidget:

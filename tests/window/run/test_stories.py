@@ -431,6 +431,7 @@ def test_nothing_is_cut_in_the_smallest_window(
     for page in window.pages:
         window.show_page(page)
         qtbot.waitUntil(page.isVisible)
+        qtbot.wait(1)  # what is laid out later is laid out now
         for made in page.findChildren(QLabel) + page.findChildren(QAbstractButton):
             wraps = isinstance(made, QLabel) and made.wordWrap()
             if made.isVisible() and made.text() and not wraps:
