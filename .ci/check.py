@@ -1,4 +1,4 @@
-"""Run every check that a change has to pass: tests, linter, formatter, types, layers.
+"""Run every check that a change has to pass: tests, the deep ones of this day, and .ci/static.py.
 
 ``--venv DIR`` names another environment than .venv; other arguments go to pytest.
 """
@@ -7,7 +7,7 @@ import argparse
 import sys
 
 import static
-from bootstrap import ROOT, VENV, prepare
+from bootstrap import ROOT, VENV, prepare, run
 from test import test
 
 if __name__ == "__main__":
@@ -15,4 +15,8 @@ if __name__ == "__main__":
     parser.add_argument("--venv", default=VENV)
     options, others = parser.parse_known_args()
     python = prepare("test", ROOT / options.venv)
-    sys.exit(test(python, *others) or static.check(python))
+    sys.exit(
+        test(python, *others)
+        or run([str(python), "-m", "tests.deep", "--today"])
+        or static.check(python)
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 __all__ = [
@@ -13,11 +13,14 @@ __all__ = [
     "NOTHING_MISSING",
     "NOT_CONFIRMED",
     "PARTLY_EXPLAINED",
+    "REJECTED_BELOW",
     "STOPPED",
     "TOLERANCE",
     "UNEXPLAINED",
     "Judgement",
+    "is_rejected",
     "judge",
+    "smallest_p",
 ]
 
 NOTHING_MISSING = "nothing_missing"
@@ -38,6 +41,10 @@ TOLERANCE = 1.15
 #: Twice the logarithm of the odds, e^5, by which validation recordings have to be more probable
 #: with the effects that were found than without them: as much as tells two explanations apart.
 CONFIRMING = 10.0
+
+#: Probability, of noise alone, below which a model is called rejected: that of a right model is, on
+#: one recording of a thousand.
+REJECTED_BELOW = 1e-3
 
 
 @dataclass(frozen=True)
@@ -91,3 +98,17 @@ def judge(
     }
     reasons = tuple(name for name, doubtful in doubts.items() if doubtful)
     return Judgement(PARTLY_EXPLAINED if reasons else found, reasons)
+
+
+def is_rejected(p: float | None) -> bool:
+    """Whether the probability that noise alone leaves a residual rejects the model.
+
+    Not where it is not known.
+    """
+    return p is not None and p < REJECTED_BELOW
+
+
+def smallest_p(values: Iterable[float | None]) -> float | None:
+    """Return the probability of the least of several independent ``values``; None for none."""
+    known = [p for p in values if p is not None]
+    return min(1.0, len(known) * min(known)) if known else None

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.deep.share import VARIABLE, share_of
+
 # the published tests explain their failures as those here do
 pytest.register_assert_rewrite("dearig.drivers.contract")
 
@@ -23,3 +25,14 @@ os.environ["DEARIG_LOG_DIR"] = str(Path(tempfile.gettempdir()) / "dearig-tests-l
 settings.register_profile("explore", deadline=None)
 settings.register_profile("repeatable", deadline=None, derandomize=True, database=None)
 settings.load_profile("explore" if os.environ.get("DEARIG_EXPLORE") else "repeatable")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Deselect the deep tests that are not of the share that ``tests.deep`` chose."""
+    if VARIABLE not in os.environ:
+        return
+    marks = ("deep", "more_examples")
+    deep = [item for item in items if any(map(item.get_closest_marker, marks))]
+    chosen = share_of([item.nodeid for item in deep], os.environ[VARIABLE])
+    config.hook.pytest_deselected(items=[i for i in items if i.nodeid not in chosen])
+    items[:] = [item for item in items if item.nodeid in chosen]

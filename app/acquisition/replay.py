@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from dearig.acquisition.rig_source import differences
 from dearig.acquisition.rigs import is_simulated
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
@@ -38,6 +39,37 @@ class Original:
     def on(self, rig: str) -> str:
         """Return the address for ``rig``; ``sim`` is the original's simulated rig, if any."""
         return self.rig if rig == "sim" and is_simulated(self.rig) else rig
+
+    def settings(self, rig_file: Path | None) -> RigFile:
+        """Return the settings to repeat the run on a simulated rig.
+
+        Raises ``InputError`` where a ``rig_file`` is given too.
+        """
+        if rig_file is not None:
+            raise InputError(
+                f"--rig-file {rig_file} cannot be used with --like {self.path} on a simulated rig: "
+                f"the recording has its own rig file; leave --rig-file out"
+            )
+        return self.rig_file
+
+    def differences(self, rig: str, rig_file: Path | None, settings: RigFile) -> tuple[str, ...]:
+        """Return what differs between the original's rig file and ``settings``, in sentences.
+
+        On a ``rig`` that is not simulated, scaling and limits are those of its own ``rig_file``:
+        raises ``InputError`` where none is given.
+        """
+        if rig_file is None:
+            raise InputError(
+                f"rig {rig!r} is not simulated: only the sequence of {self.path} can be repeated "
+                f"on it, and a recording of another rig knows neither its scaling nor its limits; "
+                f"give the rig's own file with --rig-file"
+            )
+        if not self.configuration:
+            return (f"{self.path} holds no rig file, so nothing was compared",)
+        found = differences(self.rig_file, settings)
+        if not found:
+            return (f"{self.path} was recorded with the same rig file",)
+        return (f"{self.path} was recorded with another rig file; what differs:", *found)
 
     def check_film(self, rig_file: RigFile) -> None:
         """Raise ``InputError`` unless film and load of ``rig_file`` are those of the original.

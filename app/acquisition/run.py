@@ -138,6 +138,7 @@ def record(
     ended it: the first ctrl-C ramps down in the set time, the second takes the output to 0 V at
     once.
     """
+    # One piece: what is opened here is closed here in the reverse order, whatever happens between.
     out = check_output(out, options.overwrite)
     planned = plan(loaded, rig_file, options.actuator, options.film_id, progress)
     waveform = planned.admitted()
@@ -187,7 +188,10 @@ def record(
                 model_toml=overlay.toml if overlay is not None else "",
                 configuration=options.configuration,
                 seed=options.seed if is_simulated(address) else None,
-                provenance={} if loop is None else {"feedback": loop.toml()},
+                provenance={
+                    **options.provenance,
+                    **({} if loop is None else {"feedback": loop.toml()}),
+                },
             )
             writer = RecordingWriter(
                 out, identity, rate, waveform.samples, metadata,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from dearig.acquisition.feedback import FeedbackReport
@@ -26,6 +27,8 @@ class RunOptions:
     ``film_id`` (by default the rig file's film) and ``notes`` are kept too. With ``overwrite`` an
     existing file is replaced; with ``fsync`` flushed data survive a power cut. ``waveform_digest``
     is that of the plan that was shown and armed: another waveform is refused; "" admits any.
+    ``provenance`` has further texts for the recording's provenance, by name, such as where the rig
+    file came from.
 
     Only for a simulated rig: ``seed`` of its noise, ``paced`` for real time, ``actuator`` in place
     of the film that ``sim`` has by default, and the ``faults`` that occur in it.
@@ -42,6 +45,7 @@ class RunOptions:
     paced: bool = False
     actuator: Actuator | None = None
     faults: FaultPlan | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

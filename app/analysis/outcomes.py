@@ -115,6 +115,18 @@ class Comparison:
         good = np.isfinite(rest)
         return slow_at_rest(time[good], rest[good], self.noise) > 0.0
 
+    @cached_property
+    def misfit_p(self) -> float | None:
+        """The probability that noise as that at rest leaves this residual, or None.
+
+        Of an actuator with enough readings at rest, as ``dearig.model.fitting.rejection`` has it.
+        """
+        if self.kind == "film" or not self.quiet_count:
+            return None
+        from dearig.model.fitting.rejection import misfit_p
+
+        return misfit_p(self.measured - self.model, self.measured[: self.quiet_count])
+
     @property
     def steady_rms(self) -> float:
         """The error in the measured unit, without the recording's own drift and events."""

@@ -13,7 +13,7 @@ from dearig.analysis import hold as holding
 from dearig.analysis.hold import HoldOptions
 from dearig.api.display import card, drawing, write_page
 from dearig.api.models import ModelSource, read_model
-from dearig.api.recordings import Recording, RigSource, load_rig
+from dearig.api.recordings import Recording, RigSource, load_rig, rig_provenance
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
@@ -199,7 +199,7 @@ def hold(
         displacement_mm * 1e-3, seconds, read_model(model), rig, settings, Path(out),
         RunOptions(
             text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
-            faults=read_faults(faults),
+            faults=read_faults(faults), provenance=rig_provenance(rig_file),
         ),
         options, feedback=feedback, progress=progress,
     )  # fmt: skip

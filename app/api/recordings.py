@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import tomli_w
 
 from dearig.acquisition.overlay import OverlayModel
+from dearig.acquisition.rig_source import SOURCE, source_of
 from dearig.acquisition.rigs import read_faults
 from dearig.acquisition.run import RunOptions
 from dearig.acquisition.run import record as run
@@ -41,7 +42,7 @@ from dearig.report.text.numbers import seconds, significant
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Recording", "RigSource", "load_rig", "open", "record"]
+__all__ = ["Recording", "RigSource", "load_rig", "open", "record", "rig_provenance"]
 
 #: The path of a rig file, or its tables, such as ``{"load": {"mass_g": 50}}``.
 RigSource = str | Path | Mapping[str, Mapping[str, object]]
@@ -275,7 +276,7 @@ def record(
     in_step = None if overlay is None else _overlay_model(overlay)
     options = RunOptions(
         text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
-        actuator=actuator, faults=read_faults(faults),
+        actuator=actuator, faults=read_faults(faults), provenance=rig_provenance(rig_file),
     )  # fmt: skip
     folder = None if path is not None else Path(tempfile.mkdtemp(prefix="dearig-"))
     out = Path(path) if path is not None else _unnamed(folder, sequence, loaded)
@@ -315,6 +316,12 @@ def _actuator(source: ModelSource) -> tuple[ModelFile, Actuator]:
             f"of an actuator"
         )
     return file, file.model
+
+
+def rig_provenance(source: RigSource | None) -> dict[str, str]:
+    """Return what a recording says of where its rig file came from."""
+    said = "tables given to the call" if isinstance(source, Mapping) else source_of(source)
+    return {SOURCE: said}
 
 
 def load_rig(source: RigSource | None) -> tuple[RigFile, str]:

@@ -16,7 +16,7 @@ from dearig.analysis.track_target import plan_target
 from dearig.analysis.tracking import TrackedRun, TrackOutcome
 from dearig.api.display import card, drawing, facts, table_html, write_page
 from dearig.api.models import ModelSource, read_model
-from dearig.api.recordings import Recording, RigSource, load_rig
+from dearig.api.recordings import Recording, RigSource, load_rig, rig_provenance
 from dearig.config.targetfile import LoadedTarget, load_target, target_of
 from dearig.errors import InputError
 from dearig.model.control import Unreachable
@@ -405,7 +405,7 @@ def track(
         _target(target), read_model(model), rig, settings, Path(out),
         RunOptions(
             text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
-            faults=read_faults(faults),
+            faults=read_faults(faults), provenance=rig_provenance(rig_file),
         ),
         iterations=iterations, compare=None if compare is None else read_model(compare),
         nearest=nearest, within=within_um * 1e-6, progress=progress,

@@ -1,4 +1,4 @@
-"""Commands for many runs without a person beside them: campaign, campaign-queue."""
+"""Commands for many unattended runs: campaign, campaign-queue."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ from dearig.cli.output import (
     working,
     write_result,
 )
+from dearig.cli.rig_settings import announce_rig, rig_settings
 from dearig.errors import InputError
 
 if TYPE_CHECKING:
@@ -121,6 +122,7 @@ def campaign(
     fault of an instrument or a doubt about 0 V halts the campaign until a person acknowledges it.
     Ctrl-C ramps the voltage down to 0 V and ends the campaign; --resume continues it.
     """  # fmt: skip
+    from dearig.acquisition.rig_source import SOURCE
     from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.readings.compatibility import of_rig
@@ -129,8 +131,6 @@ def campaign(
     from dearig.cli.terminal import campaign_runs
     from dearig.config.campaignfile import load_campaign
     from dearig.config.modelfile import load_actuator
-    from dearig.config.rigfile import load_rig_file
-    from dearig.config.toml_input import read_text
     from dearig.report.pages.campaign import (
         campaign_json,
         forecast_json,
@@ -139,8 +139,7 @@ def campaign(
     )
 
     check_files(force, (plan, rig_file, model), json=json)
-    loaded, settings = load_campaign(plan), load_rig_file(rig_file)
-    text = "" if rig_file is None else read_text(rig_file, "rig file")
+    loaded, (settings, text, provenance) = load_campaign(plan), rig_settings(rig_file)
     actuator = None
     if model is not None:
         actuator = load_actuator(model)
@@ -155,9 +154,10 @@ def campaign(
     faults = read_faults(fault or ())
     options = RunOptions(
         text, operator, film, notes, fsync=fsync, seed=seed, paced=paced, actuator=actuator,
-        faults=faults,
+        faults=faults, provenance=provenance,
     )  # fmt: skip
     with working(json) as (console, progress):
+        announce_rig(console, rig, settings, provenance[SOURCE])
 
         def finish(outcome: CampaignOutcome) -> None:
             """Write and show what was done."""
@@ -195,7 +195,7 @@ def campaign_queue(
 ) -> None:
     """Show the runs of a campaign, or change the order of those that wait.
 
-    The running campaign reads what is asked between two runs; it never starts a run by itself that
+    The running campaign reads what is asked between two runs; it never starts a run on its own that
     was not armed. A run that goes on is ended with ctrl-C where the campaign runs.
     """
     from dearig.batch.ask import ask

@@ -21,6 +21,7 @@ from dearig.cli.options import (
     Seed,
 )
 from dearig.cli.output import check_files, print_line, print_lines, working, write_result
+from dearig.cli.rig_settings import announce_rig, rig_settings
 from dearig.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def hold(
         float, typer.Option(help="Fastest change of the correction, in % of the voltage per s.")
     ] = 1.0,
     response_s: Annotated[
-        float, typer.Option(help="Response time of the loop in s, beside its delay.")
+        float, typer.Option(help="Response time of the loop in s, in addition to its delay.")
     ] = 1.0,
     ahead_s: Annotated[
         float,
@@ -103,24 +104,23 @@ def hold(
     The model's voltage is corrected while it is played. Every correction passes the gate before it
     is output. Ctrl-C ramps the voltage down to 0 V and keeps what was recorded.
     """
+    from dearig.acquisition.rig_source import SOURCE, film_differences
     from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.hold import HoldOptions, actuator_of, check_hold, plan_hold
     from dearig.analysis.hold import hold as run
     from dearig.config.modelfile import load_model
-    from dearig.config.rigfile import load_rig_file
-    from dearig.config.toml_input import read_text
     from dearig.report.pages.hold import hold_json, hold_summary
 
     length = _seconds(duration)
     written = () if out is None else (out,)
     check_files(force, (model, rig_file), *written, json=json, recording=out)
-    settings, ours = load_rig_file(rig_file), load_model(model)
-    text = "" if rig_file is None else read_text(rig_file, "rig file")
+    (settings, text, provenance), ours = rig_settings(rig_file), load_model(model)
     faults = read_faults(fault or ())
     run_options = RunOptions(
-        text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=faults
-    )
+        text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=faults,
+        provenance=provenance,
+    )  # fmt: skip
     options = HoldOptions(
         rise_s, authority_pct / 100.0, rate_pct_per_s / 100.0, response_s, ahead_s, laser_loss_s
     )
@@ -140,6 +140,9 @@ def hold(
     if out is None:
         raise InputError("--out FILE.h5 is missing: the recording is written there")
     with working(json, whole=True) as (console, progress):
+        actuator = actuator_of(ours)
+        other = film_differences(actuator.film, actuator.load, settings)
+        announce_rig(console, rig, settings, provenance[SOURCE], other)
         observer, shown = _live(console, progress)
         outcome = run(
             setpoint, length, ours, rig, settings, out, run_options, options, observer=observer,

@@ -27,6 +27,7 @@ from dearig.cli.options import (
     notify_from,
 )
 from dearig.cli.output import announce_compilation, check_files, print_line, working, write_result
+from dearig.cli.rig_settings import announce_rig, rig_settings
 from dearig.errors import InputError
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ Like = Annotated[
     typer.Option(
         metavar="FILE.h5",
         help="Repeat the run of this recording: its sequence, rig file and simulated rig, and "
-        "its seed unless --seed is given.",
+        "its seed unless --seed is given. On a rig that is not simulated only the sequence is "
+        "repeated, with the scaling and the limits of --rig-file.",
     ),
 ]
 SimulatedModel = Annotated[
@@ -74,6 +76,15 @@ ModelInStep = Annotated[
     typer.Option(
         metavar="MODEL.toml",
         help="Compute this model's prediction during the run, and record it.",
+    ),
+]
+SeedOrThatOfLike = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        max=10**15,
+        help="Seed of the simulated noise.",
+        show_default="that of --like, else 0",
     ),
 ]
 # ---------------------------------------------------------------- commands
@@ -91,7 +102,7 @@ def record(
     fsync: Fsync = False,
     paced: Paced = False,
     fault: Faults = None,
-    seed: Seed = 0,
+    seed: SeedOrThatOfLike = None,
     operator: Operator = "",
     film: FilmName = "",
     notes: Notes = "",
@@ -106,31 +117,41 @@ def record(
     Ctrl-C ramps the voltage down to 0 V and keeps what was recorded.
     """
     from dearig.acquisition.overlay import OverlayModel
-    from dearig.acquisition.rigs import read_faults
+    from dearig.acquisition.rig_source import SOURCE
+    from dearig.acquisition.rigs import kind_of, read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.acquisition.run import record as run
     from dearig.analysis.readings.compatibility import of_rig
     from dearig.batch.notify import Notifier
     from dearig.config.modelfile import load_actuator
     from dearig.config.notify import Notify
-    from dearig.config.rigfile import load_rig_file
     from dearig.config.sequencefile import load_sequence
     from dearig.config.toml_input import read_text
 
     check_files(force, (sequence, rig_file, model, overlay, like), out, json=json, recording=out)
-    original = _original(sequence, like, rig_file)
+    original = _original(sequence, like)
     if original is None:
-        settings = load_rig_file(rig_file)
-        text = "" if rig_file is None else read_text(rig_file, "rig file")
-        loaded = load_sequence(str(sequence))
+        loaded, simulated = load_sequence(str(sequence)), False
     else:
-        settings, text, loaded = original.rig_file, original.configuration, original.sequence
-        rig, seed = original.on(rig), seed or original.seed
+        loaded, rig = original.sequence, original.on(rig)
+        simulated = kind_of(rig).simulated
+    if original is not None and simulated:
+        settings, text = original.settings(rig_file), original.configuration
+        provenance = {SOURCE: f"the rig file in {like}"}
+    else:
+        settings, text, provenance = rig_settings(rig_file)
+    if original is not None:
+        provenance |= {"repeats": f"{like}"}
+    if seed is None:
+        seed = original.seed if original is not None and simulated else 0
+    told: tuple[str, ...] = ()
+    if original is not None and not simulated:
+        told = original.differences(rig, rig_file, settings)
     actuator = None
     if model is not None:
         actuator = load_actuator(model)
         settings = of_rig(settings, actuator.film, actuator.load)
-    if original is not None:
+    if original is not None and simulated:
         original.check_film(settings)
     faults = read_faults(fault or ())
     overlaid = None
@@ -140,7 +161,7 @@ def record(
         )
     options = RunOptions(
         text, operator, film, notes, overwrite=force, fsync=fsync,
-        seed=seed, paced=paced, actuator=actuator, faults=faults,
+        seed=seed, paced=paced, actuator=actuator, faults=faults, provenance=provenance,
     )  # fmt: skip
     notifier = Notifier(notify_from(notify_command, notify_webhook, notify_on, Notify()))
     with working(json) as (console, progress):
@@ -148,7 +169,7 @@ def record(
         def play() -> RunResult:
             return run(
                 loaded, rig, settings, out, options, overlay=overlaid, progress=progress,
-                observer=_announcer(console, settings),
+                observer=_announcer(console, settings, provenance[SOURCE], told),
             )  # fmt: skip
 
         result = notifier.tell_of(out, play)
@@ -156,7 +177,7 @@ def record(
     write_result(_run_json(result), json)
 
 
-def _original(sequence: str | None, like: Path | None, rig_file: Path | None) -> Original | None:
+def _original(sequence: str | None, like: Path | None) -> Original | None:
     """Return the run to repeat, or None where a sequence was given instead."""
     from dearig.acquisition.replay import original_of
 
@@ -167,16 +188,13 @@ def _original(sequence: str | None, like: Path | None, rig_file: Path | None) ->
             f"both a sequence ({sequence}) and a recording to repeat (--like {like}) are given; "
             f"give one of them"
         )
-    if like is not None and rig_file is not None:
-        raise InputError(
-            f"--rig-file {rig_file} cannot be used with --like {like}, which has its own rig "
-            f"file; leave --rig-file out"
-        )
     return None if like is None else original_of(like)
 
 
-def _announcer(console: Console, settings: RigFile) -> RunObserver:
-    """Return an observer that says, before a run on a card, whether its watchdog is wired."""
+def _announcer(
+    console: Console, settings: RigFile, source: str, differing: tuple[str, ...]
+) -> RunObserver:
+    """Return an observer that says, before a run, what applies on a rig that is not simulated."""
     from dearig.acquisition.run import RunObserver
     from dearig.drivers.daqmx.watchdog import watchdog_text
 
@@ -185,6 +203,7 @@ def _announcer(console: Console, settings: RigFile) -> RunObserver:
             if identity.address.startswith("daqmx:"):
                 words = watchdog_text(settings.card, identity.simulated)
                 print_line(console, f"hardware watchdog: {words}")
+            announce_rig(console, identity.address, settings, source, differing)
 
     return Announcer()
 

@@ -87,7 +87,7 @@ def study(
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Fit, diagnose or validate many recordings, each by itself, into one table.
+    """Fit, diagnose or validate many recordings, each separately, into one table.
 
     With --own the recordings of a film share parameters and are fitted together. A broken recording
     fails alone; its row says why. What was computed is kept in the cache, so that a study that was

@@ -21,6 +21,7 @@ from dearig.cli.options import (
     Seed,
 )
 from dearig.cli.output import check_files, print_line, working, write_result
+from dearig.cli.rig_settings import announce_rig, rig_settings
 from dearig.errors import InputError
 
 if TYPE_CHECKING:
@@ -106,20 +107,18 @@ def track(
     `dearig record`. Ctrl-C ramps the voltage down to 0 V, ends the learning, and keeps what was
     done.
     """
+    from dearig.acquisition.rig_source import SOURCE, film_differences
     from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.track import track as follow
     from dearig.analysis.track_target import check_feasible, plan_target
     from dearig.analysis.tracking import TrackOutcome
     from dearig.config.modelfile import load_actuator, load_model
-    from dearig.config.rigfile import load_rig_file
     from dearig.config.targetfile import load_target
-    from dearig.config.toml_input import read_text
     from dearig.report.pages.track import track_json, write_track_report
 
     check_files(force, (target, model, compare, rig_file), json=json)
-    loaded, settings = load_target(target), load_rig_file(rig_file)
-    text = "" if rig_file is None else read_text(rig_file, "rig file")
+    loaded, (settings, text, provenance) = load_target(target), rig_settings(rig_file)
     ours = load_model(model)
     actuator = load_actuator(model)  # refuses that of a bare film
     if check:
@@ -135,10 +134,15 @@ def track(
         raise InputError("--out DIR is missing: recordings and the report are written there")
     faults = read_faults(fault or ())
     options = RunOptions(
-        text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=faults
-    )
+        text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=faults,
+        provenance=provenance,
+    )  # fmt: skip
     report = out / "report.html"
     with working(json) as (console, progress):
+        announce_rig(
+            console, rig, settings, provenance[SOURCE],
+            film_differences(actuator.film, actuator.load, settings),
+        )  # fmt: skip
 
         def finish(outcome: TrackOutcome) -> None:
             """Write and show what was done."""

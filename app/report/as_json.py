@@ -13,6 +13,7 @@ from dearig.analysis.outcomes import (
     pooled_over_noise,
     pooled_steady_rms,
 )
+from dearig.model.verdict import is_rejected, smallest_p
 from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
 
@@ -50,6 +51,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
             "model": outcome.model_name,
             "model_path": outcome.model_path,
             **_noise_json(outcome.kind, outcome.comparisons),
+            **_rejection_json(outcome.comparisons),
             "recordings": [_comparison_json(c) for c in outcome.comparisons],
             "warnings": list(warnings_of(outcome)),
         }
@@ -64,6 +66,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "model_path": outcome.model_path,
         **_noise_json(outcome.kind, outcome.train),
         "residual_over_noise": _number(pooled_over_noise(outcome.train)),
+        **_rejection_json(outcome.train),
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
         "covariance": covariance_table(fit.covariance_names, fit.covariance),
         "uncertainty_budget": budget_table(fit.budget),
@@ -82,6 +85,11 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
 
 def _number(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _rejection_json(comparisons: tuple[Comparison, ...]) -> dict[str, Any]:
+    p = smallest_p(c.misfit_p for c in comparisons)
+    return {"misfit_p": _number(p), "rejected": None if p is None else is_rejected(p)}
 
 
 def _noise_json(kind: str, comparisons: tuple[Comparison, ...]) -> dict[str, Any]:
@@ -197,6 +205,7 @@ def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:
 
 def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
     """``outcome`` for ``--json`` of diagnose, in the units that the keys end with."""
+    # One piece: the document key by key, as the page on JSON lists it.
     finding, shown = outcome.finding, SHOWN[outcome.kind]
     before, after = outcome.before, outcome.after
     experiment = outcome.experiment

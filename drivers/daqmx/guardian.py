@@ -37,7 +37,7 @@ _STARTS_WITHIN = 60.0  # s: an interpreter, the driver's library, a connection
 _HEARS_WITHIN = 0.3
 _LATE = 0.05  # s for an acknowledgement that the listener has read at this moment
 _ANSWERS_WITHIN = 0.5  # s from a word other than a beat to its acknowledgement
-_TAKES_OVER_WITHIN = 5.0  # s; it keeps trying after that, but the operator must be told
+_TAKES_OVER_WITHIN = 5.0  # s; it keeps trying after that, but the operator is notified
 _ENDS_WITHIN = 5.0  # s
 # s; a process that has ended has written its error by then, and the message must not wait longer
 _ERROR_WITHIN = 0.5
@@ -85,16 +85,19 @@ class Guardian(Protocol):
 
     @property
     def granted(self) -> tuple[str, ...]:
-        """Return what the system granted it, such as real-time priority, in words."""
+        """Return what the system granted it, such as real-time priority, as text."""
         ...
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Return what the system refused it, in words."""
+        """Return what the system refused it, as text."""
         ...
 
     def arm(self) -> None:
-        """Start to watch: silence means a frozen run. Raises ``RigError`` without an answer."""
+        """Start to watch: silence means a frozen run.
+
+        Raises ``RigError`` without an answer, and where it has acted and was not disarmed since.
+        """
         ...
 
     def beat(self) -> bool:
@@ -110,7 +113,7 @@ class Guardian(Protocol):
         ...
 
     def disarm(self) -> None:
-        """Stop watching: the output is at 0 V."""
+        """Stop watching: the output is at 0 V. After a take-over the card is released."""
         ...
 
     def take_over(self) -> TakeOver:
@@ -132,7 +135,7 @@ class Guardian(Protocol):
 
 
 class GuardianProcess:
-    """A guardian for the card at ``address``, started at once.
+    """A guardian for the card at ``address``, started immediately.
 
     Raises ``RigError`` when it cannot be started, does not reach the card or runs other sources
     than this program, with the last line of its error stream. ``clock`` measures its answers.
@@ -199,16 +202,19 @@ class GuardianProcess:
 
     @property
     def granted(self) -> tuple[str, ...]:
-        """Return what the system granted it, such as real-time priority, in words."""
+        """Return what the system granted it, such as real-time priority, as text."""
         return tuple(self._ready["granted"]) if self._ready else ()
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Return what the system refused it, in words."""
+        """Return what the system refused it, as text."""
         return tuple(self._ready["refused"]) if self._ready else ()
 
     def arm(self) -> None:
-        """Start to watch: silence means a frozen run. Raises ``RigError`` without an answer."""
+        """Start to watch: silence means a frozen run.
+
+        Raises ``RigError`` without an answer, and where it has acted and was not disarmed since.
+        """
         with self._news:
             self._report = None
         if not self._ask("arm"):
@@ -217,6 +223,9 @@ class GuardianProcess:
                 f"output to 0 V if this program died; start the run again"
             )
         self._guards = True
+        acted = self.report()
+        if acted is not None:
+            raise RigError(f"the card is held at 0 V: {acted.sentence}")
 
     def beat(self) -> bool:
         """Report that the run is alive; returns False if the guardian is not. Never blocks."""
@@ -258,10 +267,12 @@ class GuardianProcess:
             return self._report
 
     def disarm(self) -> None:
-        """Stop watching: the output is at 0 V."""
-        if self._guards:
-            self._guards = False
+        """Stop watching: the output is at 0 V. After a take-over the card is released."""
+        if self.report() is not None:
+            self._ask("disarm")
+        elif self._guards:
             self._send("disarm")
+        self._guards = False
 
     def take_over(self) -> TakeOver:
         """Request 0 V now. Raises ``RigError`` where the guardian does not set it."""
@@ -301,7 +312,7 @@ class GuardianProcess:
         return report
 
     def close(self) -> None:
-        """End the guardian; one that still tries to reach the card goes on and reports the end."""
+        """End the guardian; one that still tries to reach the card reports its end."""
         self._send("bye")
         if self._process.stdin is not None:
             with contextlib.suppress(OSError):  # it has ended and closed its end of the pipe
@@ -358,7 +369,7 @@ class GuardianProcess:
         return True
 
     def _listen(self) -> None:
-        """Read the guardian's lines at once, so that it never waits for this process.
+        """Read the guardian's lines immediately, so that it never waits for this process.
 
         The stream stays open as long as the guardian lives, even after ``close``: one that still
         tries to reach the card must be able to write.

@@ -36,24 +36,35 @@ class Guard:
     """Guardian's response to each word and to silence.
 
     ``zero`` takes the output to 0 V and returns the voltage monitor's reading. ``say`` replies to
-    the run, ``tell`` informs the operator at the terminal. After a take-over it is not armed until
-    the run arms it again: a run that continues finds its tasks cleared and makes itself safe.
+    the run, ``tell`` informs the operator at the terminal.
+
+    After a take-over output and enable line stay reserved, so that the card refuses whatever a run
+    does that was frozen and goes on. ``disarm``, which a run sends when it has made itself safe,
+    calls ``release``. Until then ``arm`` is answered by the report of the take-over.
     """
 
     zero: Callable[[], ZeroReading | None]
     say: Callable[[str], None]
     tell: Callable[[str], None]
+    release: Callable[[], None] = field(default=lambda: None)
     armed: bool = field(default=False)
+    acted: str = field(default="")  # report of a take-over that was not followed by ``disarm``
 
     def hear(self, word: str | None) -> bool:
         """Act on ``word``, None for the end of the run's pipe; returns False to end."""
-        if word is not None:
-            self.say("heard")
+        # the answer to these two comes first, so that the run has it when they are acknowledged
         if word == "arm":
-            self.armed = True
+            self.armed = not self.acted
+            if self.acted:
+                self.say(self.acted)
         elif word == "disarm":
             self.armed = False
-        elif word == "take over":
+            if self.acted:
+                self.acted = ""
+                self.release()
+        if word is not None:
+            self.say("heard")
+        if word == "take over":
             self.take_over("the run could not bring the output to 0 V itself")
         elif word is None or word == "bye":
             if word is None and self.armed:
@@ -78,7 +89,8 @@ class Guard:
         except RigError as failed:
             error = str(failed)
         report = TakeOver(why, at, time.monotonic() - start, error, monitor)
-        self.say(f"acted {json.dumps(asdict(report))}")
+        self.acted = f"acted {json.dumps(asdict(report))}"
+        self.say(self.acted)
         self.tell(report.sentence)
 
 
@@ -98,7 +110,7 @@ def main(configuration: str) -> int:
         _say(f"cannot {error}")
         return 1
 
-    guard = Guard(lambda: _insist(outputs, settings.guardian.retry_s), _say, _tell)
+    guard = Guard(lambda: _insist(outputs, settings.guardian.retry_s), _say, _tell, outputs.release)
     words: queue.SimpleQueue[str | None] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(words,), daemon=True).start()
     _say(f"ready {json.dumps(_ready())}")

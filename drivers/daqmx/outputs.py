@@ -28,15 +28,15 @@ T = TypeVar("T")
 
 _MONITOR_READINGS = 20  # the amplifier's output falls in less than a millisecond
 _AVERAGED = 10  # values of an input, whose mean is one reading
-_OUTPUT, _ENABLE = "output", "enable line"  # keys of the tasks, beside the names of the inputs
+_OUTPUT, _ENABLE = "output", "enable line"  # keys of the tasks, with the inputs' names
 
 
 class Outputs:
     """Outputs of the card ``device`` behind ``link``, of a rig with ``settings``.
 
-    A task is made once for each output and input, and holds nothing of the card between two calls:
-    making one takes ten calls of a server, writing a value takes one. Every method raises
-    ``RigError`` where the card or its server fails.
+    A task is made once for each output and input: making one takes ten calls of a server, writing a
+    value takes one. It holds nothing of the card between two calls, except from ``shut`` to
+    ``release``. Every method raises ``RigError`` where the card or its server fails.
     """
 
     def __init__(self, link: Link, device: str, settings: RigSettings) -> None:
@@ -45,11 +45,15 @@ class Outputs:
         self._settings = settings
         self._tasks: dict[str, nidaqmx.Task] = {}
         self._card: Device | None = None
+        self._keeps = False  # True while output and enable line stay reserved after a write
+        self._resets = 0
         #: reading of the monitor after the last call that set 0 V, None where there is none
         self.zero_reading: ZeroReading | None = None
 
     def prepare(self) -> None:
         """Make every call of ``shut`` once: it then has nothing left to import, load or make.
+
+        Afterwards nothing of the card is reserved.
 
         The output goes to 0 V and the enable line low, which a card in use refuses.
         """
@@ -57,9 +61,11 @@ class Outputs:
             from nidaqmx.system import Device
 
             self._card = Device(self._device, grpc_options=self._link.session)
+        self._keeps = True
         self._write_zero()
         self._disable()
         self.check_zero()
+        self.release()
         # an error of the card loads code too; nothing changes at a terminal that does not exist
         with contextlib.suppress(RigError):
             self._with_task("no such terminal", self._add_unknown, _write_low)
@@ -78,13 +84,39 @@ class Outputs:
         self.check_zero()
 
     def shut(self) -> None:
-        """Set 0 V and the enable line low, also on a card in use, and check the monitor."""
+        """Set 0 V and the enable line low, also on a card in use, and check the monitor.
+
+        Both stay reserved until ``release``. The card itself then refuses a task that would output
+        or enable anything, such as the next call of a run that was frozen and goes on.
+        """
         self.zero_reading = None
+        self._keeps = True
         try:
             self._forced(self._write_zero)
         finally:
+            resets = self._resets
             self._forced(self._disable)
         self._forced(self.check_zero)
+        if self._resets != resets:
+            raise RigError(
+                f"card {self._device}: another program reserved it while its output was taken to "
+                f"0 V: end the other program"
+            )
+
+    def release(self) -> None:
+        """Let other tasks have output and enable line again; both keep their values."""
+        self._keeps = False
+        from nidaqmx.constants import TaskMode
+
+        for key in (_OUTPUT, _ENABLE):
+            task = self._tasks.get(key)
+            if task is None:
+                continue
+            try:
+                with self._errors():
+                    task.control(TaskMode.TASK_UNRESERVE)
+            except RigError:  # such as a task that a reset has ended: it is made again when needed
+                self._drop(key)
 
     def disable(self) -> None:
         """Set the line that enables the amplifier's high voltage low, if it is wired."""
@@ -97,6 +129,7 @@ class Outputs:
                 from nidaqmx.system import Device
 
                 self._card = Device(self._device, grpc_options=self._link.session)
+            self._resets += 1
             self._card.reset_device()
 
     def check_zero(self) -> None:
@@ -200,8 +233,12 @@ class Outputs:
                 if task is None:
                     task = self._tasks[key] = nidaqmx.Task(grpc_options=self._link.session)
                     add(task)
+                keeps = self._keeps and key in (_OUTPUT, _ENABLE)
+                if keeps:
+                    task.control(TaskMode.TASK_RESERVE)
                 result = use(task)
-                task.control(TaskMode.TASK_UNRESERVE)
+                if not keeps:
+                    task.control(TaskMode.TASK_UNRESERVE)
                 return result
         except RigError as error:
             if error.code != RESERVED:

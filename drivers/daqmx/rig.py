@@ -12,12 +12,12 @@ import numpy as np
 
 from dearig.drivers.command import Command
 from dearig.drivers.daqmx.address import Address
-from dearig.drivers.daqmx.explain import ABORTED, TIMEOUT, WATCHDOG_EXPIRED, explained
+from dearig.drivers.daqmx.explain import ABORTED, RESERVED, TIMEOUT, WATCHDOG_EXPIRED, explained
 from dearig.drivers.daqmx.guardian import Guardian, GuardianProcess, TakeOver
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.daqmx.tasks import ClockedTasks, identify_card
-from dearig.drivers.errors import RigError, RigStateError
+from dearig.drivers.errors import NotAtZero, RigError, RigStateError
 from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.identity import instruments
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState, expect
@@ -33,7 +33,7 @@ _WAIT = 0.25  # s for samples, between two beats of the guardian
 _OVERDUE = 2.0  # s without a sample while the clock should run
 _UNGUARDED = "no answer from the guardian process"
 # errors of a run whose tasks the guardian is about to end, or has just ended
-_TAKEN = (*ABORTED, WATCHDOG_EXPIRED)
+_TAKEN = (*ABORTED, RESERVED, WATCHDOG_EXPIRED)
 _REPORT_WITHIN = 0.5  # s from such an error to the guardian's report
 _REPORTED_WITHIN = 0.05  # s, after any other error, for a report that has arrived
 
@@ -77,6 +77,8 @@ class DaqmxRig:
         self._state = RigState.SAFE
         self._tasks: ClockedTasks | None = None
         self._run: _Run | None = None
+        self._engaged = False  # True while what holds the card may be this rig's own
+        self._watched = False  # True from ``arm`` to the end of ``make_safe``
         self._link = Link(address.server, settings)
         self._outputs = Outputs(self._link, address.device, settings)
         try:
@@ -107,7 +109,7 @@ class DaqmxRig:
 
     @property
     def guardian_tries(self) -> bool:
-        """Return True while the guardian goes on trying to set 0 V, after ``make_safe`` failed."""
+        """Return True while the guardian still tries to set 0 V, after ``make_safe`` failed."""
         return self._guardian.tries
 
     def await_guardian(self, within: float) -> TakeOver | None:
@@ -149,10 +151,12 @@ class DaqmxRig:
                 f"a rig plays a GatedWaveform, which drivers.gate.admit makes, "
                 f"not {type(waveform).__name__}"
             )
-        with self._lock:
+        with self._lock, self._guardian_named():
             expect(self._state, "load", RigState.SAFE, RigState.DONE)
+            self._expect_not_taken("load")
             waveform.check_within(self._settings.limits.gate_limits(waveform.limits.film))
             self._drop_tasks()
+            self._engaged = True
             tasks = ClockedTasks(self._link, self._address.device, self._settings)
             try:
                 command = Command(waveform, self._card.channels[0].scaling)
@@ -167,8 +171,10 @@ class DaqmxRig:
 
     def arm(self) -> None:
         """Prepare for a start without delay; the output is at 0 V, and guarded from now on."""
-        with self._lock:
+        with self._lock, self._guardian_named():
             expect(self._state, "arm", RigState.LOADED)
+            self._expect_not_taken("arm")
+            self._watched = True
             self._guardian.arm()
             self._loaded()[0].arm()
             self._guardian.beat()  # arming the card takes a while on a busy computer
@@ -178,6 +184,7 @@ class DaqmxRig:
         """Start the sample clock."""
         with self._lock, self._guardian_named():
             expect(self._state, "start", RigState.ARMED)
+            self._expect_not_taken("start")
             tasks, run = self._loaded()
             self._guardian.beat()
             if self._guardian.refused:
@@ -225,17 +232,23 @@ class DaqmxRig:
             self._stop(*self._loaded())
 
     def make_safe(self) -> None:
-        """Take the output to 0 V at once, check it on the monitor, and discard the waveform.
+        """Take the output to 0 V immediately, check it on the monitor, and discard the waveform.
 
-        Raises ``RigError`` where neither this program nor the guardian could do so.
+        A card that this rig does not use is not reset. Raises ``RigError`` where neither this
+        program nor the guardian could do so.
         """
         with self._lock:
             if self._state is RigState.CLOSED:
                 return
             mistake: Exception | None = None
             try:
-                self._bring_down()
-            except Exception as error:  # noqa: BLE001  (whatever failed, a voltage may be on)
+                if not self._engaged or self._taken_down() is not None:
+                    self._leave()
+                else:
+                    self._bring_down()
+            except Exception as error:
+                if not self._engaged:  # what may be on is another program's, and its guardian's
+                    raise
                 code = error.code if isinstance(error, RigError) else None
                 try:
                     self._guardian.take_over()
@@ -245,6 +258,7 @@ class DaqmxRig:
                 log.warning("%s; the guardian was asked", error)
                 mistake = None if isinstance(error, RigError) else error
             self._guardian.disarm()
+            self._engaged = self._watched = False
             self._state = RigState.SAFE
             if mistake is not None:
                 raise mistake
@@ -293,6 +307,7 @@ class DaqmxRig:
             raise RigError(explained(self._address.device, ABORTED[0], ""), ABORTED[0])
         if played >= run.total:
             return
+        self._expect_not_taken("stop")
         volts, samples = run.command.ramp_from(played, self._settings.limits.ramp_down_s)
         tasks.continue_from(played)
         run.events.append(
@@ -314,6 +329,24 @@ class DaqmxRig:
                 f"next run"
             )
 
+    def _taken_down(self) -> TakeOver | None:
+        """Return the guardian's take-over since ``arm`` that ended at 0 V, None without one."""
+        acted = self._guardian.report() if self._watched else None
+        return acted if acted is not None and acted.confirmed else None
+
+    def _expect_not_taken(self, call: str) -> None:
+        """Raise ``RigError`` where the guardian has acted since ``arm``.
+
+        This gives the sentence. What keeps the output down is the card, where the guardian holds
+        output and enable line: this process may be stopped at any place after the check.
+        """
+        acted = self._guardian.report() if self._watched else None
+        if acted is not None:
+            raise RigError(
+                f"{call}: {acted.sentence}; make the rig safe and load the waveform again, which "
+                f"admits it anew"
+            )
+
     @contextmanager
     def _guardian_named(self) -> Iterator[None]:
         """Add to an error of the card what the guardian did, or that it gives no answer."""
@@ -323,7 +356,9 @@ class DaqmxRig:
             raise
         except RigError as error:
             late = _REPORT_WITHIN if error.code in _TAKEN else _REPORTED_WITHIN
-            acted = self._guardian.report(late)
+            acted = self._guardian.report(late) if self._watched else None
+            if acted is not None and acted.sentence in str(error):
+                raise
             if acted is not None:
                 raise RigError(f"{error}; {acted.sentence}", error.code) from error
             if self._run is not None and self._run.unguarded and error.code is not None:
@@ -334,6 +369,28 @@ class DaqmxRig:
         if self._tasks is None or self._run is None:
             raise RigError("no waveform is loaded")
         return self._tasks, self._run
+
+    def _leave(self) -> None:
+        """Clear this rig's tasks, and set 0 V only where no other program uses the card.
+
+        The output is at 0 V already: the guardian took it down, or nothing was loaded since. What
+        holds the card now is the guardian, which ``disarm`` lets go, or another program's run,
+        which a reset of the card would end.
+        """
+        tasks, self._tasks, self._run = self._tasks, None, None
+        if tasks is not None:
+            try:
+                tasks.forget()
+            except RigError as error:  # the guardian's reset has ended them
+                log.info("%s", error)
+        if self._watched:
+            self._guardian.disarm()
+        try:
+            self._outputs.zero()
+        except NotAtZero:
+            raise
+        except RigError as error:  # in use by another program, or not reached
+            log.warning("%s; the output is not this program's, and is left alone", error)
 
     def _bring_down(self) -> None:
         """Set 0 V and check it on the monitor; then set the enable line low in any case."""

@@ -182,7 +182,7 @@ class ClockedTasks:
         if left <= 0:
             return
         room = self._buffer - (self._written - max(delivered, self._first))
-        # wait for room for a large piece; what became available while it is played goes out at once
+        # wait for room for a large piece; what became available during play goes out now
         if room >= self._buffer // 4 or room >= left:
             self._write(room)
 
@@ -224,6 +224,13 @@ class ClockedTasks:
             calls.append(lambda: enable.write(False, auto_start=True))
         calls.extend(partial(clear, task) for task in (enable, watchdog) if task is not None)
         self._all(calls)
+
+    def forget(self) -> None:
+        """Clear every task, and leave output and enable line as they are. Raises as ``close``."""
+        enable, watchdog = self._enable, self._watchdog
+        self._enable = self._watchdog = None
+        rest = [partial(clear, task) for task in (enable, watchdog) if task is not None]
+        self._all([self.release, *rest])
 
     def close(self) -> None:
         """Clear every task.

@@ -49,7 +49,7 @@ class AmplifierDriver(Protocol):
 
 
 def zero_findings(monitors: Monitors, settings: RigSettings) -> tuple[Finding, ...]:
-    """Return whether ``monitors`` show that there is no voltage on the film, with 0 V commanded.
+    """Return whether ``monitors`` show that the film has no voltage, with 0 V commanded.
 
     The voltage monitor must read within ``limits.zero_tolerance_kV``. NaN does not count as zero.
     """

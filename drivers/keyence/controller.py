@@ -310,7 +310,7 @@ class Keyence:
     def _take(self) -> bytes:
         return self._port.read(max(1, min(self._port.in_waiting, _LINE_MAX)))
 
-    # ------------------------------------------------------------ what to tell
+    # ------------------------------------------------------------ reports
 
     def _refused(self, text: str, code: int) -> LaserError:
         meaning, advice = ERRORS.get(

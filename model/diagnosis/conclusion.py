@@ -219,9 +219,18 @@ class Conclusion:
 
 
 def conclude(
-    found: SearchResult, fitter: Fitter, without: Callable[[Fit, str], Fit], held: bool = False
+    found: SearchResult,
+    fitter: Fitter,
+    without: Callable[[Fit, str], Fit],
+    held: bool = False,
+    stop: Callable[[], bool] = lambda: False,
 ) -> Diagnosis:
-    """Return the diagnosis that a search has ``found``; ``without(fit, name)`` refits."""
+    """Return the diagnosis that a search has ``found``; ``without(fit, name)`` refits.
+
+    Intervals end, and are those of the curvature from then on, where ``stop()`` is True or the work
+    has taken what the settings allow.
+    """
+    allowed = fitter.settings.effort * (1.0 + fitter.settings.intervals)
     end = Conclusion(found, fitter, without)
     judge, full = found.judge, fitter.full
     others = end.for_others()
@@ -232,6 +241,7 @@ def conclude(
         fitter.raw,
         profiled=fitter.thinned_about(end.last, found.best.drift),
         for_others=others,
+        ended=lambda: stop() or fitter.work.effort > allowed,
     )
     steps, rivals = end.steps(final)
     before, after = signatures(full, end.first), signatures(full, end.last)

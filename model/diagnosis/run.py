@@ -80,7 +80,7 @@ def diagnose(
         if held:
             found, search = other, again
     progress("final fits", _LAST)
-    diagnosis = conclude(found, search.fitter, search.without, held)
+    diagnosis = conclude(found, search.fitter, search.without, held, stop)
     progress("final fits", 1.0)
     return diagnosis
 

@@ -25,6 +25,9 @@ class DiagnosisSettings:
     ----------
     effort
         Integration steps that the search may take: some 45 s of two cores.
+    intervals
+        Part of the effort that the intervals may take after the search: those of most diagnoses
+        take less than the search, and a profile that does not end is not worth more.
     branch_time_min_s
         A branch that relaxes faster than the excitation varies acts as a drag, and is sought as
         one: half of the shortest lobe's quarter.
@@ -88,6 +91,7 @@ class DiagnosisSettings:
     """
 
     effort: float = 2.8e8
+    intervals: float = 0.5
     branch_time_min_s: float = 0.1
     branch_time_max: float = 3.0
     grid_ratio: float = 1.25

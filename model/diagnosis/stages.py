@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -37,10 +37,11 @@ def stage_of(
     *,
     profiled: WhitenedProblem | None = None,
     for_others: Actuator | Strip | None = None,
+    ended: Callable[[], bool] = lambda: False,
 ) -> Stage:
     """Return the errors of ``fit``; with ``profiled`` the intervals of its parameters too.
 
-    That is a problem with the same optimum, on which their likelihood is profiled.
+    That is a problem with the same optimum, on which their likelihood is profiled until ``ended``.
     ``for_others`` is the model that predicts other recordings, where it is another one. Errors are
     of readings of the ``full`` records.
     """
@@ -58,7 +59,7 @@ def stage_of(
     if profiled is not None:
         values = problem.layout.values(fit.x)
         found, names, covariance = estimates_with_intervals(
-            profiled, values, fit.fixed, lambda _: None, lower_ends=False
+            profiled, values, fit.fixed, lambda _: None, lower_ends=False, ended=ended
         )
         estimates = (*found, *_drift_estimates(fit))
     return Stage(

@@ -11,14 +11,24 @@ import numpy as np
 
 from dearig.model.fitting.intervals import correlation_time, covariance, profile
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Estimate, Layout
+from dearig.model.fitting.parameters import NORMAL_95, Estimate, Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
-__all__ = ["AT_BOUND", "at_bound", "estimates_with_intervals", "is_determined", "recentre"]
+__all__ = [
+    "AT_BOUND",
+    "BY_CURVATURE",
+    "at_bound",
+    "estimates_with_intervals",
+    "is_determined",
+    "recentre",
+]
 
 #: Note of a parameter at the end of its search range.
 AT_BOUND = "at the end of its search range"
+
+#: Note of an interval whose profile was not followed.
+BY_CURVATURE = "from the curvature at the optimum: the profile was not followed to its end"
 
 _DETERMINED_RATIO = 5.0  # ratio of the ends of an interval, above which a value is not quoted
 _J_WORDS = "no spring stiffens measurably at these stretches: only a lower bound"
@@ -51,6 +61,14 @@ def recentre(means: Problem, full: Problem, values: np.ndarray) -> None:
     means.set_readings(of_means[0] + moved)
 
 
+class _Ended(Exception):  # noqa: N818  (it is no error)
+    """The profiles are to end."""
+
+
+def _never() -> bool:
+    return False
+
+
 def estimates_with_intervals(
     problem: Problem,
     values: np.ndarray,
@@ -58,14 +76,17 @@ def estimates_with_intervals(
     report: Callable[[float], None],
     lower_ends: bool = True,
     which: np.ndarray | None = None,
+    ended: Callable[[], bool] = _never,
 ) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
     """Return estimates at ``values`` (d,) with 95 % intervals, and names and covariance (f, f).
 
     ``held`` (d,) bool are parameters that were not fitted; with ``lower_ends`` each locking limit
     among them is freed alone for its own lower end. ``problem`` has its optimum near ``values``.
     Only the parameters ``which`` (d,) bool get an estimate, where it is given.
-    ``report`` receives the fraction that is done, at each point of a profile. The covariance, in SI
-    units, is that of the parameters that were fitted.
+    ``report`` receives the fraction that is done, at each point of a profile. Once ``ended()`` is
+    True no profile is followed any further: the intervals that are left come from the curvature at
+    the optimum, and their notes say so. The covariance, in SI units, is that of the parameters that
+    were fitted.
     """
     layout = problem.layout
     centre = descend(problem, layout.coordinates(values), held, iterations=10)
@@ -88,9 +109,16 @@ def estimates_with_intervals(
             # how many points a profile takes is not known: four are the rule
             part = 1.0 - 0.5 ** (next(points) / 2.0)
             report((before + part) / len(wanted))
+            if ended():
+                raise _Ended
 
         sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already at its upper end
-        low, high = profile(problem, centre.x, chi2, j, jac, inflation, held, tick, sides)
+        try:
+            low, high = profile(problem, centre.x, chi2, j, jac, inflation, held, tick, sides)
+            followed = True
+        except _Ended:
+            low, high = _by_curvature(centre.x, cov, free, j)
+            followed = False
         if q.logarithmic:
             low, high = math.exp(low), math.exp(high)
         # an open end of a spring's parameter is 0 or infinite, of an effect's the end of its range
@@ -103,12 +131,25 @@ def estimates_with_intervals(
             note = _J_WORDS if low > 0.0 else "not determined by these data"
         elif ends[j]:
             note = AT_BOUND
+        elif not followed:
+            note = f"{note}; {BY_CURVATURE}" if note else BY_CURVATURE
         estimates.append(
             Estimate(q.name, q.unit, value, low, high, determined, note, at_bound=bool(ends[j]))
         )
     names = tuple(n for n, f in zip(layout.names, free, strict=True) if f)
     natural = np.where([q.logarithmic for q in layout.quantities], values, 1.0)[free]
     return estimates, names, cov * np.outer(natural, natural)
+
+
+def _by_curvature(
+    x: np.ndarray, cov: np.ndarray, free: np.ndarray, index: int
+) -> tuple[float, float]:
+    """Return the linear 95 % interval of coordinate ``index`` about ``x`` (d,); open where held."""
+    if not free[index]:
+        return -math.inf, math.inf
+    place = int(np.count_nonzero(free[:index]))
+    width = NORMAL_95 * math.sqrt(float(cov[place, place]))
+    return float(x[index]) - width, float(x[index]) + width
 
 
 def at_bound(layout: Layout, x: np.ndarray) -> np.ndarray:

@@ -22,11 +22,13 @@ from dearig.model.fitting.intervals import CHI2_95, correlation_time, firm_direc
 from dearig.model.fitting.levenberg import LocalFit, descend, gain_that_counts
 from dearig.model.fitting.parameters import Contribution, Estimate, Layout, require_free
 from dearig.model.fitting.problem import Problem
+from dearig.model.fitting.rejection import misfit_p
 from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
 from dearig.model.fitting.thinning import thinned
-from dearig.model.readings.records import FilmRecord, Record
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
+from dearig.model.verdict import is_rejected, smallest_p
 
 __all__ = [
     "METHODS",
@@ -44,6 +46,7 @@ METHODS = ("hybrid", "de")
 _COARSE_RATE = 50.0
 _POPULATIONS = 20.0  # simulated until a descent counts as half done
 _COARSE_SAMPLES = 1500  # of a film record
+_MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
 # Of an interval's width, which means and quicker steps may change: it changes a coverage of 95 %
@@ -66,9 +69,10 @@ class Identification:
     ``covariance`` (f, f) that of ``covariance_names``, in SI units. ``cost`` is the mean square of
     the residuals over the noise (1 when only noise is left); ``correlation`` the correlation
     time of the residuals in samples, by which the intervals are widened. ``held_limits`` names the
-    locking limits that were held because the data do not determine them. ``warnings``
-    are sentences for the operator. ``budget`` are the contributions of given values to the
-    uncertainty (``dearig.model.fitting.budget``).
+    locking limits that were held because the data do not determine them. ``warnings`` are sentences
+    for the operator. ``misfit_p`` is the probability that noise as that at rest leaves the residual
+    of the training records, None where their rest does not tell. ``budget`` are the contributions
+    of given values to the uncertainty (``dearig.model.fitting.budget``).
     """
 
     method: str
@@ -83,6 +87,7 @@ class Identification:
     warnings: tuple[str, ...]
     held_limits: tuple[str, ...] = ()
     budget: tuple[Contribution, ...] = ()
+    misfit_p: float | None = None
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -183,7 +188,13 @@ def _result(
         )  # fmt: skip
     correlation = correlation_time(fit.residuals)
     warnings = []
-    if fit.cost > 1.5 and method == "hybrid":
+    p = _misfit_p(problem, fit.residuals)
+    if is_rejected(p):
+        warnings.append(
+            f"the model is rejected: noise as that at rest leaves such a residual with "
+            f"p = {p:.1g}; the intervals hold only if the model were right; run a diagnosis"
+        )
+    elif fit.cost > _MISFIT and p is None and method == "hybrid":
         warnings.append(
             "the residual is above the noise: the model lacks something, and the intervals "
             "(widened by the residual's size and correlation) are a rough guide"
@@ -207,7 +218,21 @@ def _result(
         simulations=problem.simulations,
         converged=fit.converged,
         warnings=tuple(warnings),
+        misfit_p=p,
     )
+
+
+def _misfit_p(problem: Problem, residuals: np.ndarray) -> float | None:
+    """Return the probability that noise alone leaves ``residuals`` (N,), over the noise."""
+    found, start = [], 0
+    for record in problem.records:
+        part = slice(start, start + record.measured.size)
+        start = part.stop
+        if isinstance(record, ActuatorRecord):
+            good = np.isfinite(problem.sigma[part])
+            left = np.where(good, residuals[part] * record.noise, np.nan)
+            found.append(misfit_p(left, record.displacement[: record.lead_in]))
+    return smallest_p(found)
 
 
 def coarse_problem(

@@ -22,6 +22,7 @@ __all__ = [
     "is_flat",
     "linear_widths",
     "profile",
+    "spectrum_distance",
     "unevenness",
 ]
 
@@ -67,39 +68,46 @@ def unevenness(residuals: np.ndarray, by_chance: float = _BY_CHANCE) -> float:
     """Return the least share of the power of ``residuals`` (N,) that white noise does not explain.
 
     0 where white noise shows as much with a probability above ``by_chance``.
-    Bartlett's test: the periodogram of white noise, summed up, is a straight line (Durbin,
-    Biometrika 56, 1969). With 5000 samples it detects a twentieth of the power elsewhere.
+    With 5000 samples it detects a twentieth of the power elsewhere.
     """
-    power = np.abs(np.fft.rfft(residuals))[1:-1] ** 2
-    summed = np.cumsum(power)
-    if summed.size < 2 or summed[-1] <= 0.0:
-        return 0.0
-    m = summed.size - 1
-    line = np.arange(1, m + 1) / (m + 1.0)
-    away = float(np.max(np.abs(summed[:-1] / summed[-1] - line)))
-    return away if kolmogorov(away * math.sqrt(m)) <= by_chance else 0.0
+    away, lines = spectrum_distance(residuals)
+    return away if kolmogorov(away * math.sqrt(lines)) <= by_chance else 0.0
 
 
 def has_spectrum_of(residuals: np.ndarray, noise: np.ndarray) -> bool:
-    """Whether the spectrum of ``residuals`` (N,) is that of a sample of ``noise`` (M,), by chance.
+    """Whether ``residuals`` (N,) have the spectrum of a sample of ``noise`` (M,), by chance."""
+    away, lines = spectrum_distance(residuals, noise)
+    return bool(kolmogorov(away * math.sqrt(lines)) > _BY_CHANCE)
 
-    The test of Kolmogorov and Smirnov on two summed periodograms, each divided by its total. A
-    line of a periodogram has the variance of its mean squared, so that a spectrum of few lines
-    counts as few.
+
+def spectrum_distance(
+    residuals: np.ndarray, noise: np.ndarray | None = None
+) -> tuple[float, float]:
+    """Return how far the summed periodogram of ``residuals`` (N,) is from that of noise.
+
+    The largest distance of the two, each divided by its total, and how many independent lines it
+    counts for: times their root it is distributed as Kolmogorov's. White noise, for a ``noise`` of
+    None, has a straight line (Bartlett's test; Durbin, Biometrika 56, 1969). Against a sample of
+    ``noise`` (M,) it is the test of Kolmogorov and Smirnov; there a line of a periodogram has the
+    variance of its mean squared, so that a spectrum of few lines counts as few.
     """
-    sums, lines = [], []
-    for values in (residuals, noise):
-        power = np.abs(np.fft.rfft(values - values.mean()))[1:-1] ** 2
-        total = float(power.sum())
-        if power.size < 2 or total <= 0.0:
-            return True
-        place = np.arange(1, power.size + 1) / power.size
-        sums.append((place, np.cumsum(power) / total))
-        lines.append(2.0 * total**2 / float(power @ power))
-    (place, summed), (other, also) = sums
+    sums = [np.abs(np.fft.rfft(values - values.mean()))[1:-1] ** 2 for values in (residuals,)]
+    if noise is not None:
+        sums.append(np.abs(np.fft.rfft(noise - noise.mean()))[1:-1] ** 2)
+    if any(power.size < 2 or float(power.sum()) <= 0.0 for power in sums):
+        return 0.0, 0.0
+    if noise is None:
+        summed = np.cumsum(sums[0])
+        m = summed.size - 1
+        line = np.arange(1, m + 1) / (m + 1.0)
+        return float(np.max(np.abs(summed[:-1] / summed[-1] - line))), float(m)
+    (place, summed), (other, also) = (
+        (np.arange(1, power.size + 1) / power.size, np.cumsum(power) / power.sum())
+        for power in sums
+    )
+    lines = [2.0 * float(power.sum()) ** 2 / float(power @ power) for power in sums]
     away = float(np.max(np.abs(np.interp(other, place, summed) - also)))
-    counted = 1.0 / (1.0 / lines[0] + 1.0 / lines[1])
-    return bool(kolmogorov(away * math.sqrt(counted)) > _BY_CHANCE)
+    return away, 1.0 / (1.0 / lines[0] + 1.0 / lines[1])
 
 
 def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:

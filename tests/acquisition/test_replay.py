@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from dearig.recording import RunMetadata, open_recording, save_recording
-from tests.tools.command import LOBE, SLOW_RIG, dearig, done, thesis_model, write
+from tests.tools.command import LOBE, SLOW_RIG, dearig, done, refused, thesis_model, write
+from tests.tools.daqmx import served
 from tests.tools.recordings import Clock
 
 
@@ -82,3 +83,63 @@ def test_what_cannot_be_repeated(tmp_path: Path) -> None:
         assert words in answer.err
         assert not out.exists()
     assert "is the input file" in dearig("record", "--like", run, "--out", run, "--force").err
+
+
+OTHER_RIG = """\
+[film]
+name = "A7"
+[amplifier]
+gain_V_per_V = 500.0
+[limits]
+voltage_max_kV = 4.9
+"""
+CARD = '[film]\nname = "B2"\n[card]\ni_have_no_watchdog = true\n[limits]\nvoltage_max_kV = {}\n'
+
+
+@pytest.mark.parametrize("given", ["rig-file", "lower-limit", "none"])
+def test_on_a_card_only_the_sequence_of_a_recording_is_repeated(tmp_path: Path, given: str) -> None:
+    """The recording's amplifier has half the gain, and its limits are wider."""
+    run, out = tmp_path / "run.h5", tmp_path / "again.h5"
+    other = write(tmp_path / "other.toml", OTHER_RIG)
+    limit = {"rig-file": 7.5, "lower-limit": 1.0, "none": 7.5}[given]
+    ours = write(tmp_path / "ours.toml", CARD.format(limit))
+    done("record", write(tmp_path / "lobe.toml", LOBE), "--rig-file", other, "--out", run)
+    asked = () if given == "none" else ("--rig-file", ours)
+    with served() as card:
+        address = f"daqmx:Dev1@127.0.0.1:{card.server.port}"
+        answer = dearig("record", "--like", run, "--rig", address, *asked, "--out", out)
+        peaks = [abs(change.wire) for change in card.device.history()]
+    if given == "none":
+        refused(answer, "only the sequence of", "give the rig's own file with --rig-file")
+    elif given == "lower-limit":
+        refused(answer, "limits of the rig file")
+    if given != "rig-file":
+        assert max(peaks) == 0.0
+        assert not out.exists()
+        return
+    assert answer.code == 0, answer.err
+    said = answer.out
+    assert f"scaling and limits are those of rig file {ours}: amplifier 1000 V/V" in said
+    assert "amplifier.gain_V_per_V: 500 in the recording, 1000 here" in said
+    assert "limits.voltage_max_kV: 4.9 in the recording, 7.5 here" in said
+    made, before = open_recording(out), open_recording(run)
+    assert made.provenance["configuration"] == ours.read_text()
+    assert made.provenance["configuration_from"] == f"rig file {ours}"
+    assert made.provenance["repeats"] == str(run)
+    # the same voltage at the film, whatever the amplifier's gain is
+    assert made.sequence_toml == before.sequence_toml
+    assert made.voltage_command.max() == pytest.approx(before.voltage_command.max(), abs=1.0)
+
+
+def test_seed_zero_is_a_seed(tmp_path: Path) -> None:
+    """It is not taken for none: the noise of the original has another seed."""
+    first, zero, again = (tmp_path / f"{n}.h5" for n in ("first", "zero", "again"))
+    lobe, rig = write(tmp_path / "lobe.toml", LOBE), write(tmp_path / "rig.toml", SLOW_RIG)
+    done("record", lobe, "--rig-file", rig, "--seed", "5", "--out", first)
+    done("record", "--like", first, "--seed", "0", "--out", zero)
+    done("record", "--like", first, "--out", again)
+    assert not same(first, zero)
+    assert same(first, again)
+    assert [open_recording(p).provenance["seed"] for p in (zero, again)] == [0, 5]
+    assert open_recording(again).provenance["configuration_from"] == f"the rig file in {first}"
+    assert open_recording(first).provenance["configuration_from"] == f"rig file {rig}"

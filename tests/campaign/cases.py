@@ -68,7 +68,8 @@ ramp_down_s = 0.3
 [laser]
 port = "{port}"
 """
-WATCHDOG = 'do_hv_enable = "port0/line0"\nhv_enable_watchdog_s = 1.0'
+ENABLE = "port0/line0"
+WATCHDOG = f'do_hv_enable = "{ENABLE}"\nhv_enable_watchdog_s = 1.0'
 NO_WATCHDOG = "i_have_no_watchdog = true"
 
 ZERO = 50.0  # V at the film that count as 0
@@ -88,6 +89,8 @@ RESPONSE, RESPONSE_LOADED = 0.5, 1.0
 RESPONSE_HARDWARE = 0.1  # s; after two faults the card itself responds
 STALL = 10.0  # s
 LOST = 0.4  # s; blocks that the machine had not delivered yet
+ARMING = "client-frozen-arming"
+ARMING_LATEST = 0.05  # s after the enable line went high; longer than a run takes to start
 _FREEZES = "client-frozen"  # kinds after which the run is let go on
 
 
@@ -157,6 +160,8 @@ KINDS: dict[str, Expected] = {
     "client-killed-loaded": Expected(_KILLED, load=20),
     "client-killed-hostile-folder": Expected(_KILLED),
     "client-frozen": Expected((4,), _FROZEN, event="fault"),
+    # before or just after the clock starts: nothing may be enabled when it goes on
+    ARMING: Expected((4,), _FROZEN, said="the guardian acted"),
     "client-frozen-loaded": Expected((4,), _FROZEN, event="fault", load=20),
     "guardian-killed": Expected((4,), ramp=True, event="guardian"),
     "guardian-killed-loaded": Expected((4,), ramp=True, event="guardian", load=20),
@@ -288,7 +293,14 @@ def _observe(
     expected = KINDS[kind]
     bound = expected.bound + patience
     struck = None
-    if expected.recorded:
+    before = 0.0
+    if kind == ARMING:
+        _wait(lambda: device.line(ENABLE), STARTS_WITHIN)
+        freeze = clock.now() + np.random.default_rng(seed).uniform(0.0, ARMING_LATEST)
+        _wait(lambda: clock.now() >= freeze, STARTS_WITHIN)
+        run.children = psutil.Process(run.process.pid).children(recursive=True)
+        os.kill(run.process.pid, signal.SIGSTOP)
+    elif expected.recorded:
         start = _started(run.process, device) - (HOLD_LEAD_IN if kind.startswith(HOLD) else LEAD_IN)
         run.children = psutil.Process(run.process.pid).children(recursive=True)
         struck = start + moment
@@ -302,6 +314,7 @@ def _observe(
             _wait(lambda: device.wire_voltage() == 0.0 or clock.now() > end, bound + 5.0)
             before = device.wire_voltage()
             os.kill(run.process.pid, signal.SIGCONT)
+    enabled = kind == ARMING and _goes_on_and_enables(run.process, device, clock, bound)
     try:
         run.process.wait(ENDS_WITHIN)
         _kill_stopped(run.children, lambda: device.wire_voltage() == 0.0, bound)
@@ -310,7 +323,7 @@ def _observe(
         return Outcome(kind, seed, moment, None, None, "", ["it did not end"])
     # whoever comes late is given time to spoil it: for as long as a guardian takes
     _wait(lambda: not any(child.is_running() for child in run.children), 10.0)
-    wrong = []
+    wrong = ["the amplifier was enabled again"] if enabled else []
     history = device.history()
     # the wire is noted when it leaves 0 V and when it is back
     standing = [change.time for change in history if change.wire != 0.0]
@@ -320,14 +333,14 @@ def _observe(
         to_zero = max(0.0, after[0] - struck) if after else np.inf
         if bound < np.inf and to_zero > bound:
             wrong.append(f"0 V after {to_zero:.3f} s, {bound:.3f} s are allowed")
-    elif standing:
+    elif standing and kind != ARMING:
         wrong.append("there was a voltage")
-    if _FREEZES in kind and abs(before) > ZERO:
+    if abs(before) > ZERO:
         wrong.append(f"{before:.0f} V at the end of the freeze")
     stays = kind == "both-killed-no-watchdog"
-    if not stays and (abs(device.wire_voltage()) > ZERO or device.line("port0/line0")):
+    if not stays and (abs(device.wire_voltage()) > ZERO or device.line(ENABLE)):
         wrong.append(
-            f"at the end: {device.wire_voltage():.0f} V, enable line {device.line('port0/line0')}"
+            f"at the end: {device.wire_voltage():.0f} V, enable line {device.line(ENABLE)}"
         )
     wrong += _terminal_faults(expected, run.process.returncode, printed, said)
     if planted_code_ran(run.out.parents[1]):
@@ -335,6 +348,27 @@ def _observe(
     wrong += _recording_faults(kind, expected, moment, run)
     said = " ".join(said.split())
     return Outcome(kind, seed, moment, to_zero, run.process.returncode, said[-400:], wrong)
+
+
+def _goes_on_and_enables(
+    process: subprocess.Popen[str], device: SimulatedCard, clock: PacedClock, bound: float
+) -> bool:
+    """Let a run that has just been frozen go on after ``bound`` s, when its guardian has acted.
+
+    Returns True if a voltage can come back: the enable line goes high, or the output leaves 0 V.
+    """
+    end = clock.now() + bound
+    _wait(lambda: clock.now() > end, bound + 5.0)
+    os.kill(process.pid, signal.SIGCONT)
+    high = False  # polled: the deterministic interleavings are in tests/drivers/daqmx
+
+    def ended() -> bool:
+        nonlocal high
+        high = high or device.line(ENABLE) or device.output_voltage() != 0.0
+        return process.poll() is not None
+
+    _wait(ended, ENDS_WITHIN)
+    return high
 
 
 def _kill_stopped(children: list[psutil.Process], down: Callable[[], bool], bound: float) -> None:
@@ -370,6 +404,8 @@ def _recording_faults(kind: str, expected: Expected, moment: float, run: Run) ->
         found = [path for path in found if path != run.out or kind == "file-deleted"]
         if not found:
             return []
+    if kind == ARMING and not found:
+        return []  # there was no sample
     if len(found) != 1:
         return [f"{len(found)} recordings"]
     try:
@@ -378,7 +414,7 @@ def _recording_faults(kind: str, expected: Expected, moment: float, run: Run) ->
         return [f"the recording cannot be read: {error}"]
     wrong = []
     seconds = recording.samples / SAMPLE_RATE
-    if seconds < moment - FLUSH - LOST:
+    if kind != ARMING and seconds < moment - FLUSH - LOST:
         wrong.append(f"{seconds:.2f} s were recorded of {moment:.2f} s")
     if expected.event and not any(expected.event in event.message for event in recording.events):
         wrong.append(f"no event {expected.event!r} in the recording")

@@ -479,7 +479,7 @@ def test_measured_film_data(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_demo_does_the_main_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # a slow clock and one period of each lobe leave everything else as it is, and the test short
-    slow = RigFile(card=CardSettings(sample_rate_Hz=100.0))
+    slow = RigFile(card=CardSettings(sample_rate_Hz=50.0))
     monkeypatch.setattr("dearig.cli.demo.RigFile", lambda: slow)
     monkeypatch.setattr("dearig.config.sequencefile.PRESETS", SHORT_PRESETS)
     folder = tmp_path / "demo"

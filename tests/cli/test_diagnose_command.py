@@ -20,6 +20,7 @@ from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Networ
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 from dearig.recording import open_recording
+from tests.deep import mostly_deep
 from tests.report.pages.test_page import check
 from tests.tools.command import (
     SHORT_PRESETS,
@@ -35,7 +36,7 @@ from tests.tools.command import (
 from tests.tools.diagnosis import LAGGED, RIVAL, STEP, finding, stage
 from tests.tools.reports import ESTIMATES
 
-RIG = "[card]\nsample_rate_Hz = 100.0\n"
+RIG = "[card]\nsample_rate_Hz = 50.0\n"
 #: What the simulated rig of these tests hides.
 HIDDEN = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, (("amplifier offset", (("offset", 60.0),)),))
 
@@ -322,12 +323,23 @@ class TestRig:
 
     @pytest.mark.parametrize(
         ("at", "ends", "code", "interrupted"),
-        [
-            ("experiment-1", SafetyStop("displacement: the film stood 30 mm away"), 3, False),
-            ("experiment-1", InstrumentFault("the card does not answer"), 4, False),
-            ("experiment-1", DiskFault("the disk is full"), 4, False),
-            ("validation-b-7.0", Interrupted("interrupted: ramped down"), 130, True),
-        ],
+        mostly_deep(
+            [
+                pytest.param("experiment-1", SafetyStop("too far"), 3, False, id="trip"),
+                pytest.param(
+                    "experiment-1",
+                    InstrumentFault("the card does not answer"),
+                    4,
+                    False,
+                    id="fault",
+                ),
+                pytest.param("experiment-1", DiskFault("the disk is full"), 4, False, id="disk"),
+                pytest.param(
+                    "validation-b-7.0", Interrupted("ramped down"), 130, True, id="interrupted"
+                ),
+            ],
+            kept=["trip", "interrupted"],
+        ),
     )
     def test_what_ends_a_run_loses_nothing_of_what_was_found(
         self, bench, tmp_path, monkeypatch, ends, code, interrupted, at

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 import tomli_w
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dearig.cli.console import PrintableConsole
 from dearig.cli.progress_bar import progress
 from dearig.drivers.rig import Block, Event
 from dearig.printable import printable
+from tests.deep import examples
 from tests.tools.command import LOBE, Answer, dearig, done, thesis_model, write
 from tests.tools.recordings import run_counts, write_run, writer
 
@@ -51,7 +52,7 @@ def titled(path: Path, text: str) -> Path:
     return path
 
 
-@settings(max_examples=15)
+@examples(15, suite=5)
 @given(text=FILE_TEXTS)
 def test_texts_of_a_recording(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("shelf")
@@ -64,7 +65,7 @@ def test_texts_of_a_recording(text: str, tmp_path_factory: pytest.TempPathFactor
         json.loads(answer.out)
 
 
-@settings(max_examples=25)
+@examples(25, suite=10)
 @given(text=FILE_TEXTS, kind=st.sampled_from(["name", "key", "table", "kind", "line"]))
 def test_faults_of_files_in_toml(
     text: str, kind: str, tmp_path_factory: pytest.TempPathFactory
@@ -95,7 +96,7 @@ def test_faults_of_files_in_toml(
             made.unlink()
 
 
-@settings(max_examples=15)
+@examples(15, suite=5)
 @given(text=FILE_TEXTS)
 def test_columns_of_a_table(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("csv")
@@ -106,7 +107,7 @@ def test_columns_of_a_table(text: str, tmp_path_factory: pytest.TempPathFactory)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of files are less free elsewhere")
-@settings(max_examples=15)
+@examples(15, suite=5)
 @given(text=st.text(alphabet=st.characters(exclude_characters="/\0"), min_size=1, max_size=40))
 def test_names_of_files(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     raw = os.fsencode(text.encode("utf-8", "surrogateescape")[:80])

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from dearig.drivers.interlocks import Interlocks
 from dearig.drivers.rig import Block
+from tests.deep import examples
 from tests.tools.interlock_signals import (
     RATE,
     Signals,
@@ -65,7 +66,7 @@ def spoilt(faults, **locks) -> Signals:
     return signals
 
 
-@settings(max_examples=60)
+@examples(60, suite=20)
 @given(
     faults=st.lists(SPOILT, max_size=5),
     cuts=st.sets(st.integers(1, 599), max_size=40),

@@ -201,11 +201,11 @@ def test_a_bad_waveform_is_refused(bench: Path, case: str) -> None:
 IMPORTS = {
     "empty": ("", ["in.csv is empty"]),
     "no data": ("time_s,voltage_V,displacement_mm\n", ["a line of names and no data"]),
-    "no names": ("0,0,0\n1,1,1\n", ["the names #1, #2, #3 do not say", "--column 'time_s=#1'"]),
+    "no names": ("0,0,0\n1,1,1\n", ["the names #1, #2, #3 do not say", "--column time_s=COLUMN"]),
     "missing column": ("time_s,voltage_V\n0,0\n1,1\n", ["no column for displacement"]),
     "wrong unit": (
         "time_s,voltage_V,displacement_pm\n0,0,0\n1,1,1\n",
-        ["'displacement_pm' names no unit", "--column displacement_mm=displacement_pm"],
+        ["'displacement_pm' names no unit", "--column displacement_UNIT=displacement_pm"],
     ),
     "NaN": (
         "time_s,voltage_V,displacement_mm\n0,0,0\n1,nan,1\n",

@@ -22,6 +22,7 @@ from dearig.recording.exporters.contract import check_exporter
 from dearig.recording.importers import IMPORTERS, Importer, import_file
 from dearig.recording.importers.contract import check_importer
 from dearig.recording.importers.source import Source
+from tests.tools.imports import octave_text
 from tests.tools.plugins import run_with_distribution
 from tests.tools.recordings import Clock, run_counts, write_run
 
@@ -34,7 +35,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def sample_of(name: str, run: Path, folder: Path) -> Path:
-    path = folder / f"sample.{name}"
+    path = folder / f"sample.{'mat' if name == 'octave' else name}"
     if name in EXPORTS:
         return export_recording(run, name, path)
     recording = open_recording(run)
@@ -52,6 +53,8 @@ def sample_of(name: str, run: Path, folder: Path) -> Path:
                 file[f"scan/{n}"] = v
     if name == "json":
         path.write_text(json.dumps({n: v.tolist() for n, v in columns.items()}), "utf-8")
+    if name == "octave":
+        path.write_text(octave_text(columns), "utf-8")
     if name == "xlsx":
         book = Workbook()
         for row in [list(columns), *np.column_stack(list(columns.values())).tolist()]:

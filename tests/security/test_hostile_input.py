@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from dearig.printable import printable
+from tests.deep import mostly_deep
 from tests.security.cases import CASES, INPUTS, SPECIAL_FILES
 from tests.security.cost import Cost, Measured, measuring
 from tests.tools.command import LOBE, thesis_model
@@ -57,7 +58,17 @@ def answered(cost: Cost, code: int | None, *words: str) -> None:
         assert printable(text, "\n\t") == text
 
 
-@pytest.mark.parametrize("name", CASES)
+#: Others of the same kinds, or dear ones, of which the suite has another.
+DEEP = {
+    "1,000,000 segments", "10,000 wrong segments", "30,000 segments", "200,000 tones",
+    "2 MB of words", "2 MB of dots", "2 MB of digits", "2 MB of spaces", "2 MB of comments",
+    "quoted parts", "spaced parts", "number with underscores", "a name of 50 MB",
+    "checked, instruments by the thousand", "JSON of 1,000,000 arrays",
+    "JSON of 1,000,000 objects", "80,000 channels", "100,000 tables",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", mostly_deep(CASES, CASES.keys() - DEEP))
 def test_it_costs_little_and_is_answered_in_words(
     measured: Measured, short: Path, name: str
 ) -> None:
@@ -78,13 +89,20 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {path.stem: str(path) for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize("kind", SPECIAL_FILES)
+#: Every kind at a third of the inputs, which change from kind to kind, and at all of them.
+THIRDS = [pytest.param(kind, i % 3, 3, id=kind) for i, kind in enumerate(SPECIAL_FILES)]
+WHOLE = [
+    pytest.param(kind, 0, 1, id=f"{kind}, all", marks=pytest.mark.deep) for kind in SPECIAL_FILES
+]
+
+
+@pytest.mark.parametrize(("kind", "first", "step"), THIRDS + WHOLE)
 def test_what_is_no_file_is_refused_by_every_input_without_waiting(
-    measured: Measured, short: Path, good: dict[str, str], kind: str
+    measured: Measured, short: Path, good: dict[str, str], kind: str, first: int, step: int
 ) -> None:
     it = str(SPECIAL_FILES[kind](short))
     before = sorted(short.iterdir())
-    for given in INPUTS.values():
+    for given in list(INPUTS.values())[first::step]:
         places = {**good, "it": it, "out": str(short / "new")}
         cost = measured.run([word.format(**places) for word in given.split()])
         assert cost.code == 2, (given, cost)

@@ -27,8 +27,9 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 FEW = """
 import pkgutil
 every = pkgutil.iter_modules
-pkgutil.iter_modules = lambda path: (
-    m for m in every(path) if m.name in ("linear_drag", "linear_drift")
+pkgutil.iter_modules = lambda path=None, prefix="": (
+    m for m in every(path, prefix)
+    if m.ispkg or m.name.rpartition(".")[2] in ("linear_drag", "linear_drift")
 )
 """
 

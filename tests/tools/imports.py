@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,17 @@ def taken(path: Path, **options: object) -> Recording:
     """Import a file, and return the recording."""
     imported(path, **options)
     return open_recording(path.parent / "out.h5")
+
+
+def octave_text(columns: Mapping[str, np.ndarray]) -> str:
+    """A text file as Octave's ``save`` writes it by default."""
+    text = "# Created by Octave 7.3.0, Fri Nov 27 22:32:40 2026 UTC <user@host>\n"
+    for name, values in columns.items():
+        matrix = np.atleast_2d(values.T).T
+        rows = "\n".join(" " + " ".join(f"{v:.17g}" for v in row) for row in matrix)
+        text += f"# name: {name}\n# type: matrix\n# rows: {matrix.shape[0]}\n"
+        text += f"# columns: {matrix.shape[1]}\n{rows}\n\n\n"
+    return text
 
 
 def same(run: Recording) -> None:

@@ -77,6 +77,7 @@ def test_a_run_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
     assert abs(recording.voltage_command[-1]) < 1.0
 
 
+@pytest.mark.deep
 def test_edits_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "tests.window.real_window_edits", str(tmp_path)],
@@ -127,6 +128,7 @@ def test_stop_is_everywhere_and_its_keys_start_nothing(display: str, tmp_path: P
     assert saw["beside a dialog"] == ["not modal", "Stopped"]
 
 
+@pytest.mark.deep
 def test_a_killed_server_leaves_an_unknown_output_and_a_latched_alarm(
     display: str, tmp_path: Path
 ) -> None:

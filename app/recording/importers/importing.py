@@ -21,6 +21,7 @@ from dearig.recording.importers.columns.choose import choose
 from dearig.recording.importers.columns.chosen import Chosen, command_line
 from dearig.recording.importers.columns.plausible import doubts
 from dearig.recording.importers.columns.specimen import Specimen
+from dearig.recording.importers.columns.unsure import UnsureError, question
 from dearig.recording.importers.columns.values import Values, values_of
 from dearig.recording.importers.exported import exported
 from dearig.recording.importers.quantities.units import Scale
@@ -88,17 +89,6 @@ class ImportOptions:
                 raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
 
 
-class UnsureError(InputError):
-    """It is not sure which columns are ``chosen`` for what."""
-
-    def __init__(self, chosen: Chosen) -> None:
-        super().__init__(
-            f"{chosen.source.path}: it is not sure what its columns are "
-            f"({'; '.join(chosen.unsure)})"
-        )
-        self.chosen = chosen
-
-
 @dataclass(frozen=True)
 class Imported:
     """What an import did: the columns it took, ``notes`` on what it did, ``doubts`` to check."""
@@ -155,10 +145,7 @@ def import_file(
     try:
         found = prepare(path, options, metadata=metadata, progress=part(progress, 0.0, WRITING))
     except UnsureError as error:
-        line = command_line(path, out, error.chosen.pairs, error.chosen.table, _typed(options))
-        raise InputError(
-            f"{error}. If this is right, or after correcting it, run: {line}"
-        ) from error
+        raise InputError(question(error, path, out, options.columns, _typed(options))) from error
     except NeedsOptionError as error:
         more = [*_typed(options), *error.words]
         line = command_line(path, out, options.columns, options.table, more)

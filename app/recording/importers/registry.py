@@ -22,6 +22,7 @@ _OWN = MappingProxyType(
         "json": "dearig.recording.importers.formats.json_file:IMPORTER",
         "h5": "dearig.recording.importers.formats.hdf5_file:IMPORTER",
         "mat": "dearig.recording.importers.formats.mat_file:IMPORTER",
+        "octave": "dearig.recording.importers.formats.octave_file:IMPORTER",
         "parquet": "dearig.recording.importers.formats.parquet_file:IMPORTER",
         "tdms": "dearig.recording.importers.formats.tdms_file:IMPORTER",
     }
@@ -67,7 +68,7 @@ def source_at(path: Path, **options: object) -> Source:
     if chosen is None and named:
         chosen = named[0]  # its error says what is wrong with the file
     if chosen is None:
-        *most, last = (importer.suffixes[0] for importer in IMPORTERS.values())
+        *most, last = dict.fromkeys(importer.suffixes[0] for importer in IMPORTERS.values())
         raise InputError(
             f"{path}: files named {', '.join(most)} and {last} can be imported, not {suffix!r}"
         )

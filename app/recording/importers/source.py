@@ -14,6 +14,7 @@ from dearig.errors import InputError
 from dearig.recording.importers.quantities.labels import suggestion
 
 __all__ = [
+    "LOST_MAX",
     "PARSER_FAILURES",
     "GapError",
     "NeedsOptionError",
@@ -22,6 +23,7 @@ __all__ = [
     "no_such_column",
     "part_of",
     "printable",
+    "skip_or_refuse",
 ]
 
 #: Exceptions of the libraries that parse binary formats, on damaged files.
@@ -62,6 +64,9 @@ class GapError(InputError):
         self.column = column
 
 
+#: Largest part of the rows that a printed command leaves out. Faults that are rarer are those of
+#: single rows; where they are more frequent something else is wrong with the column.
+LOST_MAX = 0.1
 #: Names listed in a message, at most.
 LISTED = 12
 
@@ -147,6 +152,22 @@ def listing(names: Sequence[str]) -> str:
     """Return ``names`` for a message, the first dozen."""
     shown = ", ".join(printable(name) for name in names[:LISTED]) or "none"
     return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"
+
+
+def skip_or_refuse(said: str, lost: int, rows: int, more: str = "") -> InputError:
+    """Return the error for ``lost`` of some ``rows`` that cannot be used, the first one ``said``.
+
+    An option leaves single rows out; it is not proposed where it would leave out what matters.
+    """
+    if lost <= LOST_MAX * rows:
+        counted = f" ({lost} of {rows})" if lost > 1 else ""
+        return NeedsOptionError(
+            f"{said}; --skip-bad-rows leaves such rows out{counted}{more}", "--skip-bad-rows"
+        )
+    return InputError(
+        f"{said}; {lost} of {rows} rows are so, too many to leave out: correct the file, or export "
+        f"it again{more}"
+    )
 
 
 def no_such_column(source: Source, name: str) -> InputError:

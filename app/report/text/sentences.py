@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise, pooled_rms
 from dearig.model.readings.noise import LEAD_IN
+from dearig.model.verdict import is_rejected, smallest_p
 from dearig.report.text.numbers import seconds, significant, symbol
 from dearig.report.text.spring_names import spring_name
 from dearig.report.text.thesis import SIMULATED_CAVEAT
@@ -39,8 +40,8 @@ _METHODS = {
 }
 _NAMES_MAX = 6  # more recordings than this are counted and not named
 _LIKELY = 0.05  # a strain energy that is less probable is not named
-# RMS over noise floor below which the residual is almost only noise, and mostly noise
-_AT_NOISE, _NEAR_NOISE = 1.1, 1.5
+# RMS over noise floor up to which the residual is almost only noise, and beyond which it is more
+_AT_NOISE, _ABOVE_NOISE = 1.1, 1.5
 
 
 def listed(names: Iterable[str]) -> str:
@@ -232,14 +233,17 @@ def _error(comparisons: Sequence[Comparison]) -> str:
     if kind == "actuator" and noise_from(comparisons) != LEAD_IN:
         floor += " (from second differences, not from a lead-in at rest)"
     ratio = pooled_over_noise(comparisons) or 0.0
+    times = f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that"
+    p = smallest_p(c.misfit_p for c in comparisons)
+    if is_rejected(p):
+        return (
+            f"{times}. The model is rejected: noise as that at rest leaves such a residual with "
+            f"p = {p:.1g}."
+        )
     if ratio <= _AT_NOISE:
         return f"{words} The noise floor is {floor}: the residual is almost only noise."
-    if ratio <= _NEAR_NOISE:
-        return (
-            f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that, so "
-            f"most of the residual is noise."
-        )
-    return (
-        f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that, so "
-        f"the residual contains more than noise, which the model does not describe."
-    )
+    if p is not None:
+        return f"{times}, which noise as that at rest does not exclude (p = {p:.2g})."
+    if ratio > _ABOVE_NOISE:
+        return f"{times}, so that it is more than noise, which the model does not describe."
+    return f"{times}; there are too few readings at rest to tell whether that is more than noise."

@@ -14,6 +14,7 @@ from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from dearig.acquisition.rig_source import SOURCE
 from dearig.acquisition.rigs import is_simulated
 from dearig.acquisition.run import RunOptions
 from dearig.batch.ask import ask
@@ -161,6 +162,7 @@ class CampaignPage(Page):
         options = RunOptions(
             session.rig_text, session.operator, session.film, session.notes,
             paced=self.controls.paced.isChecked(), faults=self.faults,
+            provenance={SOURCE: session.rig_source},
         )  # fmt: skip
         arming = self.controls.arming(bool(self._queue.halted), found.forecast.digests)
         thread = CampaignThread(

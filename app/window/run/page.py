@@ -92,6 +92,7 @@ class RunPage(Page):
             seed=self._next_seed(), paced=self.paced.isChecked(), faults=self.faults,
             overlay=self._recorded_overlay(), marks=marks, waveform_digest=self.display.digest,
             feedback=None if session.hold is None else session.hold.feedback,
+            rig_source=session.rig_source,
         )  # fmt: skip
         if not self.runner.start(request, live):
             return

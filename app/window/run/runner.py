@@ -16,6 +16,7 @@ from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.plan import Plan
+from dearig.acquisition.rig_source import NO_RIG_FILE, SOURCE
 from dearig.acquisition.run import RunObserver, RunOptions, RunResult, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
@@ -99,6 +100,7 @@ class RunRequest:
     marks: RunMarks | None = None
     waveform_digest: str = ""
     feedback: Feedback | None = None
+    rig_source: str = NO_RIG_FILE
 
 
 @dataclass(frozen=True)
@@ -326,7 +328,7 @@ class _RunThread(PlayThread):
             options = RunOptions(
                 order.configuration, order.operator, order.film, order.notes,
                 seed=order.seed, paced=order.paced, faults=order.faults,
-                waveform_digest=order.waveform_digest,
+                waveform_digest=order.waveform_digest, provenance={SOURCE: order.rig_source},
             )  # fmt: skip
             result = record(
                 order.loaded, order.address, order.rig_file, out, options, overlay=order.overlay,

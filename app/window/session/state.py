@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, QSettings, Signal
 
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.plan import Plan
+from dearig.acquisition.rig_source import source_of
 from dearig.analysis.hold import HoldPlan
 from dearig.config.modelfile import model_toml
 from dearig.config.presets import PRESETS
@@ -148,6 +149,13 @@ class Session(QObject):
         if self.rig_path is not None:
             return self.rig_path.name
         return "a rig file that is not saved" if self.rig_text else "the rig file of the thesis"
+
+    @property
+    def rig_source(self) -> str:
+        """Where the rig file in force came from, in words."""
+        if self.rig_path is None and self.rig_text:
+            return "settings of the window that are in no file"
+        return source_of(self.rig_path)
 
     def set_rig_file(self, path: Path | None, text: str, rig_file: RigFile) -> None:
         """Use a rig file; recordings keep its ``text``. ``path`` is None if it is not saved."""

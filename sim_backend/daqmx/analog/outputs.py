@@ -9,14 +9,9 @@ from dearig.sim_backend.daqmx.analog.parts import AnalogParts
 from dearig.sim_backend.daqmx.card.acquisition import OwnTicks, SharedTicks
 from dearig.sim_backend.daqmx.card.checks import of_kind, raise_failure
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.card.numbers import CURRENT_WRITE, WRITE_OFFSET, WRITE_RELATIVE_TO
 from dearig.sim_backend.daqmx.card.output import Generation
-from dearig.sim_backend.daqmx.card.tasks import (
-    CURRENT_WRITE,
-    WRITE_OFFSET,
-    WRITE_RELATIVE_TO,
-    Kind,
-    Task,
-)
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.work import Work
 from dearig.sim_backend.daqmx.running.output_buffer import OutputBuffer, may_generate
 from dearig.sim_backend.daqmx.running.states import TaskStates

@@ -1,69 +1,28 @@
-"""Tasks on the card with their channels and their timing."""
+"""Tasks on the card with their settings and their state."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
 from dearig.sim_backend.daqmx.card.acquisition import Run, Ticks
-from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.card.channels import (
+    AnalogInput,
+    AnalogOutput,
+    Channel,
+    CounterChannel,
+    Lines,
+    Pulse,
+    PulseChannel,
+)
+from dearig.sim_backend.daqmx.card.errors import Code
+from dearig.sim_backend.daqmx.card.numbers import CURRENT_READ, NO_TRIGGER, RISING
 from dearig.sim_backend.daqmx.card.output import Generation, Waveform
-from dearig.sim_backend.daqmx.card.scales import Scale
-from dearig.sim_backend.daqmx.card.sensors import Sensor
 from dearig.sim_backend.daqmx.card.triggers import Reference
 from dearig.sim_backend.daqmx.card.work import Work
 
-__all__ = [
-    "ANALOG_EDGE",
-    "CURRENT_READ",
-    "CURRENT_WRITE",
-    "DIGITAL_EDGE",
-    "FALLING",
-    "FIRST_PRETRIGGER",
-    "FIRST_SAMPLE",
-    "HIGH",
-    "LINES_RATE",
-    "LOW",
-    "MOST_RECENT",
-    "NO_CHANGE",
-    "NO_TRIGGER",
-    "REFERENCE_TRIGGER",
-    "RISING",
-    "TIMEBASE",
-    "TRISTATE",
-    "WRITE_OFFSET",
-    "WRITE_RELATIVE_TO",
-    "AnalogInput",
-    "AnalogOutput",
-    "Channel",
-    "CounterChannel",
-    "Kind",
-    "Lines",
-    "Listener",
-    "Pulse",
-    "PulseChannel",
-    "SampleClock",
-    "State",
-    "Task",
-    "Watchdog",
-    "counted_on",
-    "expanded",
-    "physical_names",
-]
-
-
-RISING, FALLING = 10280, 10171  #: DAQmx: edges
-HIGH, LOW, TRISTATE, NO_CHANGE = 10192, 10214, 10310, 10160  #: DAQmx: levels of a line
-NO_TRIGGER, DIGITAL_EDGE, ANALOG_EDGE = 10230, 10150, 10099  #: DAQmx: types of a trigger
-CURRENT_READ, CURRENT_WRITE = 10425, 10430  #: DAQmx: reads and writes go on where they were
-FIRST_SAMPLE, MOST_RECENT = 10424, 10428  #: DAQmx: where a read begins
-REFERENCE_TRIGGER, FIRST_PRETRIGGER = 10426, 10427  #: DAQmx: where it begins with such a trigger
-#: Keys of properties that are kept, and refused when they would take effect.
-WRITE_RELATIVE_TO, WRITE_OFFSET = "write relative to", "write offset"
-TIMEBASE = 1e8  #: Hz; the counters' timebase of 100 MHz
-LINES_RATE = 10e6  #: Hz; the fastest sample clock of the lines of port 0
+__all__ = ["Kind", "Listener", "SampleClock", "State", "Task", "Watchdog"]
 
 
 class Kind(Enum):
@@ -91,140 +50,6 @@ class State(Enum):
     RESERVED = 1
     COMMITTED = 2
     RUNNING = 3
-
-
-@dataclass
-class AnalogInput:
-    """Input channel: ``limits`` were requested, ``range`` V, plus and minus, is in use.
-
-    With a ``scale`` or a sensor the limits are in its unit, otherwise in V. ``kept`` has the
-    properties without effect.
-    """
-
-    name: str
-    terminal: str
-    limits: tuple[float, float]
-    range: float
-    wiring: int
-    scale: Scale | Sensor | None = None
-    kept: dict[object, Any] = field(default_factory=dict)
-
-    @property
-    def volts(self) -> tuple[float, float]:
-        """Return the limits in V."""
-        return self.limits if self.scale is None else self.scale.limits(self.limits)
-
-
-@dataclass
-class AnalogOutput:
-    """Output channel, with the same fields."""
-
-    name: str
-    terminal: str
-    limits: tuple[float, float]
-    range: float
-    scale: Scale | None = None
-    kept: dict[object, Any] = field(default_factory=dict)
-
-    @property
-    def volts(self) -> tuple[float, float]:
-        """Return the limits in V."""
-        return self.limits if self.scale is None else self.scale.limits(self.limits)
-
-
-@dataclass
-class Lines:
-    """Channel of digital lines, such as ``port0/line0``.
-
-    ``columns`` are the same in the order of a waveform's data, which has the highest line of a
-    whole port first.
-    """
-
-    name: str
-    lines: tuple[str, ...]
-    columns: tuple[str, ...] = ()
-    kept: dict[object, Any] = field(default_factory=dict)
-
-
-@dataclass
-class CounterChannel:
-    """Channel of a counter input with its settings; those that it does not use are ignored.
-
-    ``terminals`` are by role: ``input`` and for some ``second``, ``direction``, ``a``, ``b``,
-    ``z``. ``limits`` are in ``units``, in which the values are too. ``measure`` and the other
-    numbers are DAQmx's.
-    """
-
-    name: str
-    terminal: str
-    measure: int
-    limits: tuple[float, float] = (0.0, 0.0)
-    units: int = 10364
-    edge: int = RISING
-    second_edge: int = RISING
-    initial: float = 0.0
-    direction: int = 10128
-    method: int = 10105
-    decoding: int = 10092
-    index: bool = False
-    index_value: float = 0.0
-    index_phase: int = 10040
-    distance: float = 1.0  # units of position for each period of the encoder
-    pulses: int = 24
-    terminals: dict[str, str] = field(default_factory=dict)
-    kept: dict[object, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Pulse:
-    """Pulse of ``high`` and ``low`` s."""
-
-    high: float
-    low: float
-
-    @classmethod
-    def of_frequency(cls, frequency: float, duty: float) -> Pulse:
-        """Return the pulse of a train of ``frequency`` Hz."""
-        if not (frequency > 0.0 and 0.0 < duty < 1.0):
-            raise DaqmxError(
-                Code.INVALID_VALUE,
-                f"Property: CO.Pulse.Freq or CO.Pulse.DutyCyc; Requested Values: {frequency:g}, "
-                f"{duty:g}",
-            )
-        return cls(duty / frequency, (1.0 - duty) / frequency)
-
-    @classmethod
-    def of_times(cls, high: float, low: float) -> Pulse:
-        """Return the pulse of ``high`` and ``low`` s; both are at least two ticks long."""
-        if not min(high, low) * TIMEBASE >= 2.0 - 1e-6:
-            raise DaqmxError(
-                Code.INVALID_VALUE,
-                f"Property: CO.Pulse.HighTime or CO.Pulse.LowTime; Requested Values: {high:g}, "
-                f"{low:g}; Minimum Value: {2.0 / TIMEBASE:g}",
-            )
-        return cls(high, low)
-
-    @classmethod
-    def of_ticks(cls, high: int, low: int) -> Pulse:
-        """Return the pulse of ``high`` and ``low`` ticks of the counters' timebase."""
-        return cls.of_times(high / TIMEBASE, low / TIMEBASE)
-
-
-@dataclass
-class PulseChannel:
-    """Channel of a counter output; ``delay`` s before the first pulse, in the idle state.
-
-    ``kind`` is DAQmx's number of how its pulses are given.
-    """
-
-    name: str
-    terminal: str
-    kind: int
-    pulse: Pulse
-    delay: float
-    idle_high: bool
-    output: str
-    kept: dict[object, Any] = field(default_factory=dict)
 
 
 @dataclass
@@ -269,9 +94,6 @@ class Listener:
     signal: int | None = None
     told: int = 0
     due: list[int] = field(default_factory=list)
-
-
-Channel = AnalogInput | AnalogOutput | Lines | CounterChannel | PulseChannel
 
 
 @dataclass(eq=False)
@@ -371,52 +193,3 @@ class Task:
         if self.retriggers:
             return None
         return self.clock.samples if self.clock and self.clock.finite else None
-
-
-_RANGE = re.compile(r"^(.*?)(\d+):(?:\1)?(\d+)$", re.IGNORECASE)
-_LONGEST_RANGE = 64  # names
-
-
-def expanded(name: str) -> list[str]:
-    """Return the names in a range such as ``ai0:2`` or ``ai0:ai2``, or the name itself.
-
-    Leading zeros of the first number give the width of all: ``in08:10`` is in08, in09, in10.
-    """
-    found = _RANGE.match(name)
-    if not found:
-        return [name]
-    first, last = int(found[2]), int(found[3])
-    if abs(last - first) > _LONGEST_RANGE:
-        raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {name}")
-    step = 1 if last >= first else -1
-    width = _width(found[2])
-    return [f"{found[1]}{n:0{width}d}" for n in range(first, last + step, step)]
-
-
-def _width(number: str) -> int:
-    """Return the width to which DAQmx fills the numbers of a range that begins at ``number``."""
-    return len(number) if number.startswith("0") and int(number) else 0
-
-
-def counted_on(name: str, count: int) -> list[str]:
-    """Return ``count`` names: DAQmx counts on from the number at the end of ``name``, or from 0."""
-    base = name.rstrip("0123456789")
-    number = name[len(base) :] or "0"
-    width, first = _width(number), int(number)
-    return [f"{base}{n:0{width}d}" for n in range(first, first + count)]
-
-
-def physical_names(text: str, device: str) -> list[str]:
-    """Return the names within ``device`` of physical channels such as ``Dev1/ai0:2, Dev1/ai5``.
-
-    Raises ``DaqmxError`` for another device or an invalid syntax.
-    """
-    names: list[str] = []
-    for part in text.split(","):
-        owner, slash, rest = part.strip().lstrip("/").partition("/")
-        if not slash or not rest:
-            raise DaqmxError(Code.INVALID_SYNTAX, f"Input: {text!r}")
-        if owner.lower() != device.lower():
-            raise DaqmxError(Code.UNKNOWN_DEVICE, f"Device Specified: {owner}")
-        names += [name.lower() for name in expanded(rest)]
-    return names

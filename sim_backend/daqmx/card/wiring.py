@@ -10,7 +10,7 @@ from pydantic import Field
 from dearig.drivers.channels import COUNT_MAX
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.card import Card
-from dearig.sim_backend.daqmx.card.tasks import AnalogInput
+from dearig.sim_backend.daqmx.card.channels import AnalogInput
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.plant import Plant
 from dearig.sim_backend.signal_path import PathState, SignalPath

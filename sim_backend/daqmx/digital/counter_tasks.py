@@ -4,24 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+from dearig.sim_backend.daqmx.card.channels import Channel, CounterChannel, Pulse, PulseChannel
 from dearig.sim_backend.daqmx.card.checks import may_add, not_running
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.card.names import named, physical_names
 from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import (
-    Channel,
-    CounterChannel,
-    Kind,
-    Pulse,
-    PulseChannel,
-    Task,
-    physical_names,
-)
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.terminals import COUNTERS, Terminals
 from dearig.sim_backend.daqmx.card.work import SampledInput
 from dearig.sim_backend.daqmx.digital.counters import CounterInput
 from dearig.sim_backend.daqmx.digital.pulses import CounterOutput, PulseSignal
 from dearig.sim_backend.daqmx.running.states import TaskStates
-from dearig.sim_backend.daqmx.setup.names import named
 from dearig.sim_backend.daqmx.setup.timing import Timing
 from dearig.sim_backend.daqmx.setup.triggering import Triggering
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.hardware import LINES
+from dearig.sim_backend.daqmx.card.names import physical_names
 from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import Kind, physical_names
+from dearig.sim_backend.daqmx.card.tasks import Kind
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.wire import Wire
 

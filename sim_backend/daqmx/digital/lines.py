@@ -6,17 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dearig.sim_backend.daqmx.card.channels import Lines
 from dearig.sim_backend.daqmx.card.checks import may_add, of_kind, raise_failure
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.card.names import named, physical_names
 from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import Kind, Lines, Task, physical_names
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.digital.digital import DigitalInput, DigitalOutput
 from dearig.sim_backend.daqmx.digital.line_levels import LineLevels
 from dearig.sim_backend.daqmx.digital.watchdogs import Watchdogs
 from dearig.sim_backend.daqmx.running.output_buffer import OutputBuffer
 from dearig.sim_backend.daqmx.running.states import TaskStates
-from dearig.sim_backend.daqmx.setup.names import named
 from dearig.sim_backend.daqmx.setup.timing import Timing
 from dearig.sim_backend.daqmx.setup.triggering import Triggering
 

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dearig.sim_backend.daqmx.card.channels import Pulse, PulseChannel
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.card.numbers import TIMEBASE
 from dearig.sim_backend.daqmx.card.signals import SAME_S, Series, Signal
-from dearig.sim_backend.daqmx.card.tasks import TIMEBASE, Pulse, PulseChannel, Task
+from dearig.sim_backend.daqmx.card.tasks import Task
 from dearig.sim_backend.daqmx.card.triggers import AwaitedEdge, Edge
 from dearig.sim_backend.daqmx.card.work import Work
 

@@ -6,16 +6,9 @@ import math
 
 from dearig.sim_backend.daqmx.card.checks import not_running
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.card.numbers import HIGH, LOW, NO_CHANGE, TRISTATE
 from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import (
-    HIGH,
-    LOW,
-    NO_CHANGE,
-    TRISTATE,
-    Kind,
-    Task,
-    Watchdog,
-)
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task, Watchdog
 from dearig.sim_backend.daqmx.card.work import Work
 from dearig.sim_backend.daqmx.digital.line_levels import LineLevels
 

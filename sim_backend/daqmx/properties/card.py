@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.hardware import INPUT_RANGES, INPUTS, LINES, OUTPUTS
+from dearig.sim_backend.daqmx.card.numbers import LINES_RATE, TIMEBASE
 from dearig.sim_backend.daqmx.card.sensors import Usage
-from dearig.sim_backend.daqmx.card.tasks import LINES_RATE, TIMEBASE
 from dearig.sim_backend.daqmx.card.terminals import COUNTERS
-from dearig.sim_backend.daqmx.digital.counters import Measure
+from dearig.sim_backend.daqmx.digital.measures import Measure
 from dearig.sim_backend.daqmx.properties.kinds import Asked, changed, given
 
 __all__ = ["CALIBRATION", "DEVICE", "PHYSICAL_CHANNEL", "SERIAL", "SYSTEM"]

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from dearig.sim_backend.daqmx.card.channels import AnalogInput, Lines
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.scales import Scale
 from dearig.sim_backend.daqmx.card.sensors import RTD_COEFFICIENTS, Sensor
-from dearig.sim_backend.daqmx.card.tasks import AnalogInput, Kind, Lines
+from dearig.sim_backend.daqmx.card.tasks import Kind
 from dearig.sim_backend.daqmx.properties.kinds import (
     Asked,
     Property,

@@ -5,19 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from dearig.sim_backend.daqmx.card.channels import CounterChannel, Pulse, PulseChannel
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import (
-    FALLING,
-    HIGH,
-    LOW,
-    RISING,
-    TIMEBASE,
-    CounterChannel,
-    Pulse,
-    PulseChannel,
-)
+from dearig.sim_backend.daqmx.card.numbers import FALLING, HIGH, LOW, RISING, TIMEBASE
 from dearig.sim_backend.daqmx.card.terminals import PFI
-from dearig.sim_backend.daqmx.digital.counters import PULSES, Measure
+from dearig.sim_backend.daqmx.digital.measures import PULSES, Measure
 from dearig.sim_backend.daqmx.digital.pulses import CounterOutput
 from dearig.sim_backend.daqmx.properties.kinds import Asked, Property, fixed, given
 

@@ -13,16 +13,10 @@ from typing import Any
 
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 
+from dearig.sim_backend.daqmx.card.channels import AnalogInput, AnalogOutput, Channel, Lines
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import (
-    AnalogInput,
-    AnalogOutput,
-    Channel,
-    Kind,
-    Lines,
-    Task,
-    expanded,
-)
+from dearig.sim_backend.daqmx.card.names import expanded
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 
 __all__ = ["Asked", "Getter", "Property", "accepted", "changed", "fixed", "given", "name_of"]

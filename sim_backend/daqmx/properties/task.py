@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import (
+from dearig.sim_backend.daqmx.card.numbers import (
     CURRENT_READ,
     CURRENT_WRITE,
     FALLING,
@@ -18,11 +18,8 @@ from dearig.sim_backend.daqmx.card.tasks import (
     RISING,
     WRITE_OFFSET,
     WRITE_RELATIVE_TO,
-    Kind,
-    State,
-    Task,
-    Watchdog,
 )
+from dearig.sim_backend.daqmx.card.tasks import Kind, State, Task, Watchdog
 from dearig.sim_backend.daqmx.properties.kinds import (
     Asked,
     Getter,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import FALLING, RISING, Kind
+from dearig.sim_backend.daqmx.card.numbers import FALLING, RISING
+from dearig.sim_backend.daqmx.card.tasks import Kind
 from dearig.sim_backend.daqmx.properties.kinds import (
     Asked,
     Property,

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import (
+from dearig.sim_backend.daqmx.card.numbers import (
     ANALOG_EDGE,
     DIGITAL_EDGE,
     FALLING,
@@ -14,8 +14,8 @@ from dearig.sim_backend.daqmx.card.tasks import (
     LOW,
     NO_TRIGGER,
     RISING,
-    Kind,
 )
+from dearig.sim_backend.daqmx.card.tasks import Kind
 from dearig.sim_backend.daqmx.card.triggers import Reference
 from dearig.sim_backend.daqmx.properties.kinds import Asked, Getter, Property, changed, fixed, given
 

@@ -11,9 +11,11 @@ import grpc
 import numpy as np
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 
+from dearig.sim_backend.daqmx.card.channels import Pulse
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import TIMEBASE, Kind, Pulse, Task
-from dearig.sim_backend.daqmx.digital.counters import (
+from dearig.sim_backend.daqmx.card.numbers import TIMEBASE
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
+from dearig.sim_backend.daqmx.digital.measures import (
     DEGREES,
     INCHES,
     METRES,

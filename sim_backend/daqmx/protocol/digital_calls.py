@@ -1,4 +1,4 @@
-"""Calls of NI's gRPC device protocol for digital lines."""
+"""Calls of NI's gRPC device protocol for digital lines and their watchdogs."""
 
 # ruff: noqa: N802, ARG002  (names, arguments and messages are the protocol's)
 
@@ -16,9 +16,11 @@ from ni.protobuf.types.waveform_conversion import (
 )
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 from nitypes.waveform import DigitalWaveform, Timing
+from session_pb2 import Session
 
+from dearig.sim_backend.daqmx.card.channels import Lines
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import Kind, Lines, Task
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.protocol.calls import BY_CHANNEL, Calls, laid_out, number, status
 
 __all__ = ["DigitalCalls"]
@@ -262,3 +264,25 @@ class DigitalCalls(Calls):
         if len(rows) != channels or not rows:
             raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, f"Task Name: {task.name}", written=0)
         return np.array(rows)
+
+    # the watchdog
+
+    def CreateWatchdogTimerTaskEx(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._device.create_watchdog(
+            request.session_name, context.peer(), request.device_name, request.timeout
+        )
+        return pb.CreateWatchdogTimerTaskExResponse(
+            task=Session(name=task.name), new_session_initialized=True
+        )
+
+    def CfgWatchdogDOExpirStates(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        names = [name.strip() for name in request.channel_names.split(",")]
+        for name, value in zip(names, request.expir_state_array, strict=True):
+            self._device.watchdogs.set_expiration(task, name, value)
+        return pb.CfgWatchdogDOExpirStatesResponse()
+
+    def ControlWatchdogTask(self, request: Any, context: grpc.ServicerContext) -> Any:
+        action = request.action_raw or request.action
+        self._device.watchdogs.control(self._task(request), clear=action == 1)
+        return pb.ControlWatchdogTaskResponse()

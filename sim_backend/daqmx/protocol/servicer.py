@@ -6,9 +6,7 @@ from __future__ import annotations
 
 import logging
 import re
-import threading
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 import grpc
@@ -19,35 +17,26 @@ from session_pb2 import Session
 
 from dearig.drivers.channels import COUNT_MAX, COUNT_MIN
 from dearig.sim_backend.daqmx.card.errors import ERROR_TEXT, Code, DaqmxError
-from dearig.sim_backend.daqmx.card.scales import (
-    LINEAR,
-    MAP,
-    POLYNOMIAL,
-    TABLE,
-    Scale,
-    reverse_coefficients,
-)
-from dearig.sim_backend.daqmx.card.tasks import Kind, Listener, Task
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.properties import attributes
 from dearig.sim_backend.daqmx.properties.attributes import Asked
-from dearig.sim_backend.daqmx.properties.channel import FROM_CUSTOM_SCALE, VOLTS
 from dearig.sim_backend.daqmx.properties.kinds import name_of
 from dearig.sim_backend.daqmx.protocol.calls import BY_CHANNEL, is_finite, laid_out, number, status
 from dearig.sim_backend.daqmx.protocol.counter_calls import CounterCalls
 from dearig.sim_backend.daqmx.protocol.digital_calls import DigitalCalls
+from dearig.sim_backend.daqmx.protocol.event_calls import EventCalls
+from dearig.sim_backend.daqmx.protocol.scale_calls import ScaleCalls
 from dearig.sim_backend.daqmx.protocol.sensor_calls import SensorCalls
 from dearig.sim_backend.daqmx.protocol.system_calls import SystemCalls
 from dearig.sim_backend.daqmx.protocol.trigger_calls import TriggerCalls
 from dearig.sim_backend.daqmx.protocol.waveform_calls import WaveformCalls
 from dearig.sim_backend.daqmx.running.reading import Reading
-from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 
 __all__ = ["Servicer", "refuse"]
 
 log = logging.getLogger(__name__)
 
 _ACTIVE_EDGE = 0x1301  # SAMP_CLK_ACTIVE_EDGE
-_POLL_S = 0.02  # period at which an event's stream checks whether it is due
 
 
 def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
@@ -63,15 +52,20 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
     raise error  # not reached: abort raises
 
 
-class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCalls, TriggerCalls):
+class Servicer(
+    SensorCalls,
+    SystemCalls,
+    WaveformCalls,
+    DigitalCalls,
+    CounterCalls,
+    TriggerCalls,
+    ScaleCalls,
+    EventCalls,
+):
     """Service of the calls; the caller handles ``DaqmxError`` and ``NotImplementedError``.
 
     All other calls are answered with UNIMPLEMENTED, and one line in the log.
     """
-
-    def __init__(self, device: SimulatedCard, closing: threading.Event) -> None:
-        super().__init__(device, closing)
-        self._streams: dict[str, Listener] = {}
 
     # tasks
 
@@ -151,74 +145,6 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
     def DisableStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
         self._device.triggering.set_start(self._task(request), "")
         return pb.DisableStartTrigResponse()
-
-    # custom scales
-
-    def CreateLinScale(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._add_scale(request, LINEAR, slope=request.slope, y_intercept=request.y_intercept)
-        return pb.CreateLinScaleResponse()
-
-    def CreateMapScale(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._add_scale(
-            request,
-            MAP,
-            map_pre_scaled=(request.prescaled_min, request.prescaled_max),
-            map_scaled=(request.scaled_min, request.scaled_max),
-        )
-        return pb.CreateMapScaleResponse()
-
-    def CreatePolynomialScale(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._add_scale(
-            request,
-            POLYNOMIAL,
-            forward=tuple(request.forward_coeffs),
-            reverse=tuple(request.reverse_coeffs),
-        )
-        return pb.CreatePolynomialScaleResponse()
-
-    def CreateTableScale(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._add_scale(
-            request,
-            TABLE,
-            table_pre_scaled=tuple(request.prescaled_vals),
-            table_scaled=tuple(request.scaled_vals),
-        )
-        return pb.CreateTableScaleResponse()
-
-    def SaveScale(self, request: Any, context: grpc.ServicerContext) -> Any:
-        """Keep a scale in the list of saved ones, until the server ends."""
-        scale = self._device.scales.find(request.scale_name)
-        self._device.scales.add(
-            replace(scale, name=request.save_as or scale.name, saved=True, author=request.author)
-        )
-        return pb.SaveScaleResponse()
-
-    def DeleteSavedScale(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.scales.remove(request.scale_name)
-        return pb.DeleteSavedScaleResponse()
-
-    def CalculateReversePolyCoeff(self, request: Any, context: grpc.ServicerContext) -> Any:
-        return pb.CalculateReversePolyCoeffResponse(
-            reverse_coeffs=reverse_coefficients(
-                list(request.forward_coeffs),
-                request.min_val_x,
-                request.max_val_x,
-                request.num_points_to_compute,
-                request.reverse_poly_order,
-            )
-        )
-
-    def _add_scale(self, request: Any, kind: int, **fields: Any) -> None:
-        units = request.pre_scaled_units_raw or request.pre_scaled_units
-        self._device.scales.add(
-            Scale(
-                request.name,
-                kind,
-                pre_scaled_units=units,
-                scaled_units=request.scaled_units,
-                **fields,
-            )
-        )
 
     # reading
 
@@ -302,94 +228,6 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         counts = scans[: request.num_samps * rows].reshape(-1, rows).T
         return pb.WriteRawResponse(samps_per_chan_written=self._write(task, counts, request))
 
-    # the watchdog
-
-    def CreateWatchdogTimerTaskEx(self, request: Any, context: grpc.ServicerContext) -> Any:
-        task = self._device.create_watchdog(
-            request.session_name, context.peer(), request.device_name, request.timeout
-        )
-        return pb.CreateWatchdogTimerTaskExResponse(
-            task=Session(name=task.name), new_session_initialized=True
-        )
-
-    def CfgWatchdogDOExpirStates(self, request: Any, context: grpc.ServicerContext) -> Any:
-        task = self._task(request)
-        names = [name.strip() for name in request.channel_names.split(",")]
-        for name, value in zip(names, request.expir_state_array, strict=True):
-            self._device.watchdogs.set_expiration(task, name, value)
-        return pb.CfgWatchdogDOExpirStatesResponse()
-
-    def ControlWatchdogTask(self, request: Any, context: grpc.ServicerContext) -> Any:
-        action = request.action_raw or request.action
-        self._device.watchdogs.control(self._task(request), clear=action == 1)
-        return pb.ControlWatchdogTaskResponse()
-
-    # events: each occupies a thread while a client listens
-
-    def RegisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
-        for outcome in self._events("done", request, context, None):
-            yield pb.RegisterDoneEventResponse(status=outcome)
-
-    def UnregisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._close_stream("done", self._task(request))
-        return pb.UnregisterDoneEventResponse()
-
-    def RegisterEveryNSamplesEvent(
-        self, request: Any, context: grpc.ServicerContext
-    ) -> Iterator[Any]:
-        direction = request.every_n_samples_event_type_raw or request.every_n_samples_event_type
-        for _ in self._events("samples", request, context, request.n_samples, direction):
-            yield pb.RegisterEveryNSamplesEventResponse(
-                every_n_samples_event_type_raw=direction, n_samples=request.n_samples
-            )
-
-    def UnregisterEveryNSamplesEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._close_stream("samples", self._task(request))
-        return pb.UnregisterEveryNSamplesEventResponse()
-
-    def RegisterSignalEvent(self, request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
-        signal = request.signal_id_raw or request.signal_id
-        for _ in self._events("signal", request, context, 1, signal=signal):
-            yield pb.RegisterSignalEventResponse(signal_id=signal)
-
-    def UnregisterSignalEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._close_stream("signal", self._task(request))
-        return pb.UnregisterSignalEventResponse()
-
-    def _events(
-        self,
-        what: str,
-        request: Any,
-        context: grpc.ServicerContext,
-        every: int | None,
-        direction: int = 0,
-        signal: int | None = None,
-    ) -> Iterator[int]:
-        """Yield the status of each event of a task until the client has heard enough."""
-        task = self._task(request)
-        listener = self._device.listen(task, every, context, direction, signal)
-        key = f"{what} {task.name}"
-        self._streams[key] = listener
-
-        def forget() -> None:
-            self._device.forget(task, listener)
-            if self._streams.get(key) is listener:
-                del self._streams[key]
-
-        if not context.add_callback(forget):
-            forget()
-        # the client waits for this before it continues
-        context.send_initial_metadata(())
-        while self._streams.get(key) is listener and context.is_active():
-            yield from self._device.due_events(task, listener)
-            if self._closing.wait(_POLL_S):
-                return
-
-    def _close_stream(self, what: str, task: Task) -> None:
-        listener = self._streams.pop(f"{what} {task.name}", None)
-        if listener is not None:
-            self._device.forget(task, listener)
-
     # shared by the calls
 
     def _asked(self, request: Any) -> Asked:
@@ -409,17 +247,6 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCal
         if samples > most:
             raise DaqmxError(Code.READ_BUFFER_TOO_SMALL, f"Task Name: {task.name}", read=0)
         return self._device.inputs.read(task, samples, request.timeout, most)
-
-    def _scale(self, request: Any) -> Scale | None:
-        """Return the custom scale of a new channel; None for V."""
-        units, name = request.units_raw or request.units, request.custom_scale_name
-        if units == FROM_CUSTOM_SCALE:
-            return self._device.scales.find(name)
-        if units != VOLTS:
-            raise DaqmxError(Code.INVALID_VALUE, f"Requested Value: {units}; units of a voltage")
-        if name:
-            raise DaqmxError(Code.UNITS_NOT_FROM_SCALE, f"Custom Scale Name: {name}")
-        return None
 
     def _outputs(self, task: Task) -> None:
         if task.kind is not Kind.AO:

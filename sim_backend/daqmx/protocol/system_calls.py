@@ -11,7 +11,7 @@ from nidaqmx._stubs import nidaqmx_pb2 as pb
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError, message_of
 from dearig.sim_backend.daqmx.card.hardware import LINES
-from dearig.sim_backend.daqmx.card.tasks import HIGH, LOW, TRISTATE
+from dearig.sim_backend.daqmx.card.numbers import HIGH, LOW, TRISTATE
 
 if TYPE_CHECKING:
     from dearig.sim_backend.daqmx.simulated_card import SimulatedCard

@@ -10,7 +10,8 @@ import grpc
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.tasks import RISING, physical_names
+from dearig.sim_backend.daqmx.card.names import physical_names
+from dearig.sim_backend.daqmx.card.numbers import RISING
 from dearig.sim_backend.daqmx.card.triggers import Reference
 from dearig.sim_backend.daqmx.protocol.calls import Calls, number
 

@@ -8,16 +8,15 @@ import numpy as np
 
 from dearig.sim_backend.daqmx.card.checks import raise_failure
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import (
+from dearig.sim_backend.daqmx.card.numbers import (
     CURRENT_READ,
     FIRST_PRETRIGGER,
     FIRST_SAMPLE,
     MOST_RECENT,
     REFERENCE_TRIGGER,
-    State,
-    Task,
 )
+from dearig.sim_backend.daqmx.card.state import CardState
+from dearig.sim_backend.daqmx.card.tasks import State, Task
 from dearig.sim_backend.daqmx.card.work import Input
 from dearig.sim_backend.daqmx.running.states import TaskStates
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from dearig.drivers.channels import COUNT_MAX
+from dearig.sim_backend.daqmx.card.channels import AnalogInput, AnalogOutput
 from dearig.sim_backend.daqmx.card.checks import may_add, not_set_while_running
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.hardware import (
@@ -16,21 +17,15 @@ from dearig.sim_backend.daqmx.card.hardware import (
     SINGLE,
     SINGLE_OWN_SENSE,
 )
+from dearig.sim_backend.daqmx.card.names import named, physical_names
 from dearig.sim_backend.daqmx.card.ranges import check_order, fitting_range, smallest_range
 from dearig.sim_backend.daqmx.card.scales import Scale
 from dearig.sim_backend.daqmx.card.sensors import Sensor
 from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import (
-    AnalogInput,
-    AnalogOutput,
-    Kind,
-    Task,
-    physical_names,
-)
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.wiring import OUTPUT_MONITOR, Wiring
 from dearig.sim_backend.daqmx.card.work import Work
 from dearig.sim_backend.daqmx.setup.custom_scales import CustomScales
-from dearig.sim_backend.daqmx.setup.names import named
 
 __all__ = ["AnalogChannels"]
 

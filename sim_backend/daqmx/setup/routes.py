@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from dearig.sim_backend.daqmx.card.acquisition import SharedTicks
+from dearig.sim_backend.daqmx.card.channels import PulseChannel
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.hardware import CLOCK_OF, PINS
 from dearig.sim_backend.daqmx.card.signals import ClockSignal, Events, Series, Signal
 from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import Kind, PulseChannel, Task
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.triggers import EdgeTicks
 

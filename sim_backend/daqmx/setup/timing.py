@@ -13,14 +13,9 @@ from dearig.sim_backend.daqmx.card.checks import (
 )
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.hardware import CLOCK_OF
+from dearig.sim_backend.daqmx.card.numbers import LINES_RATE, TIMEBASE
 from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import (
-    LINES_RATE,
-    TIMEBASE,
-    Kind,
-    SampleClock,
-    Task,
-)
+from dearig.sim_backend.daqmx.card.tasks import Kind, SampleClock, Task
 from dearig.sim_backend.daqmx.card.terminals import ON_BOARD, Terminals
 
 __all__ = ["SLOWEST_TICKS", "Timing"]

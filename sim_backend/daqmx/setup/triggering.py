@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dearig.sim_backend.daqmx.card.checks import not_running, of_kind
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import (
+from dearig.sim_backend.daqmx.card.numbers import (
     ANALOG_EDGE,
     DIGITAL_EDGE,
     FALLING,
     NO_TRIGGER,
     RISING,
-    Kind,
-    Task,
 )
+from dearig.sim_backend.daqmx.card.state import CardState
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.triggers import (
     Edge,

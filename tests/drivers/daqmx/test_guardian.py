@@ -18,11 +18,15 @@ class Bench:
         self.said: list[str] = []
         self.told: list[str] = []
         self._fails = fails
-        self.guard = Guard(self._zero, self.said.append, self.told.append)
+        self.released = 0
+        self.guard = Guard(self._zero, self.said.append, self.told.append, self._release)
 
     def reports(self) -> list[TakeOver]:
         acted = [word.removeprefix("acted ") for word in self.said if word.startswith("acted ")]
         return [TakeOver(**json.loads(report)) for report in acted]
+
+    def _release(self) -> None:
+        self.released += 1
 
     def _zero(self) -> ZeroReading | None:
         self.zeroed += 1
@@ -43,7 +47,8 @@ class Bench:
         ([None], False, 0, ""),
         (["arm", "take over"], True, 1, "could not bring the output to 0 V itself"),
         (["arm", "take over", "beat", None], False, 1, "could not bring"),
-        (["arm", "take over", "arm", None], False, 2, "the run has died"),
+        (["arm", "take over", "arm", None], False, 1, "could not bring"),
+        (["arm", "take over", "disarm", "arm", None], False, 2, "the run has died"),
         (["arm", "a word of another version"], True, 0, ""),
         (["beat"], True, 0, ""),
     ],
@@ -55,7 +60,7 @@ def test_words(words, goes_on, zeroed, told):
     assert results[-1] is goes_on
     assert bench.zeroed == zeroed
     assert bench.said.count("heard") == len([word for word in words if word is not None])
-    assert len(bench.reports()) == zeroed
+    assert len(set(bench.reports())) == zeroed
     assert all(report.confirmed for report in bench.reports())
     assert told in "".join(bench.told[-1:])
 
@@ -68,6 +73,23 @@ def test_silence_is_a_frozen_run_and_a_beat_after_it_does_not_arm_again():
     assert "frozen" in bench.told[0]
     bench.guard.hear("beat")
     assert not bench.guard.armed
+
+
+def test_what_was_taken_down_is_held_until_the_run_has_made_itself_safe():
+    bench = Bench()
+    bench.guard.hear("arm")
+    bench.guard.silence()
+    report = bench.said[-1]
+    bench.guard.hear("arm")
+    assert bench.said[-2:] == [report, "heard"]
+    assert not bench.guard.armed
+    assert bench.released == 0
+    bench.guard.hear("disarm")
+    bench.guard.hear("disarm")
+    assert bench.released == 1
+    bench.guard.hear("arm")
+    assert bench.guard.armed
+    assert bench.said[-1] == "heard"
 
 
 def test_what_cannot_be_done_is_told_to_the_run_and_to_the_person():

@@ -13,6 +13,7 @@ import pytest
 from dearig.config.rigfile import RigFile
 from dearig.drivers import sources
 from dearig.drivers.daqmx.address import Address
+from dearig.drivers.daqmx.explain import RESERVED
 from dearig.drivers.daqmx.guardian import GuardianProcess
 from dearig.drivers.errors import RigError
 from tests.tools.daqmx import ENABLE, enabled_rig, served
@@ -123,6 +124,14 @@ def test_silence_is_a_frozen_run_whatever_the_pipe_holds(bench):
     assert report.why == "the run is frozen"
     assert report.confirmed
     assert "the voltage monitor confirmed it" in report.sentence
+    with pytest.raises(RigError, match=r"held at 0 V: the guardian acted at .* is frozen"):
+        quick.guardian.arm()
+    with nidaqmx.Task(grpc_options=bench.card.session) as task:
+        task.ao_channels.add_ao_voltage_chan("Dev1/ao0")
+        with pytest.raises(nidaqmx.errors.DaqError) as refused:
+            task.write(1.0, auto_start=True)
+    assert refused.value.error_code == RESERVED
+    quick.guardian.disarm()
     quick.guardian.arm()
     assert quick.guardian.report() is None
     quick.guardian.disarm()

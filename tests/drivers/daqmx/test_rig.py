@@ -302,9 +302,20 @@ class Striker(grpc.UnaryUnaryClientInterceptor):
 STRUCK_CALLS = 24  # of a stop or a read, and of the way to 0 V after it
 
 
-@pytest.mark.parametrize("act", ["reset", "clear"])
+# both acts together strike at two of three calls of each way, in tests.deep each at all of them
+@pytest.mark.parametrize(
+    ("act", "first", "step"),
+    [
+        pytest.param("reset", 1, 3),
+        pytest.param("clear", 2, 3),
+        pytest.param("reset", 1, 1, marks=pytest.mark.deep),
+        pytest.param("clear", 1, 1, marks=pytest.mark.deep),
+    ],
+)
 @pytest.mark.parametrize("way", ["read", "stop", "make_safe"])
-def test_run_and_guardian_that_act_at_once_end_safe_with_sentences(monkeypatch, act, way):
+def test_run_and_guardian_that_act_at_once_end_safe_with_sentences(
+    monkeypatch, act, first, step, way
+):
     striker, make = Striker(), link._channel_with_deadline
     monkeypatch.setattr(
         link, "_channel_with_deadline", lambda *a: grpc.intercept_channel(make(*a), striker)
@@ -317,7 +328,7 @@ def test_run_and_guardian_that_act_at_once_end_safe_with_sentences(monkeypatch, 
                 bench.server.clients.all_gone()
 
         striker.act = strike
-        for number in range(1, STRUCK_CALLS):
+        for number in range(first, STRUCK_CALLS, step):
             begin(bench.rig, LONG)
             bench.rig.read()
             striker.number = number

@@ -25,6 +25,7 @@ from dearig.model.verdict import (
     PARTLY_EXPLAINED,
     UNEXPLAINED,
 )
+from tests.deep import mostly_deep
 from tests.tools.diagnoses import HIDDEN, of_hidden, plant
 from tests.tools.engine import (
     NOISE,
@@ -105,6 +106,7 @@ def test_nothing_is_missing_in_clean_data():
     assert moduli[0].value == pytest.approx(60e3, rel=0.01)
 
 
+@pytest.mark.deep
 def test_nothing_is_missing_in_clean_data_of_the_thesis_network():
     thesis = replace(PLAIN, network=TABLE_3)
     require_nothing(diagnose([record_of(thesis)], thesis, workers=1))
@@ -117,6 +119,7 @@ def test_nothing_is_missing_in_clean_film_data():
     assert found.steps == ()
 
 
+@pytest.mark.deep
 def test_an_effect_that_branches_imitate_is_found():
     # the drag of a resistor's 5 ms is a fast branch's: fitted from there, it ends at 0 ohm
     thesis = replace(PLAIN, network=TABLE_3)
@@ -130,7 +133,7 @@ def test_an_effect_that_branches_imitate_is_found():
     require_consistent(found)
 
 
-@pytest.mark.parametrize("name", HIDDEN)
+@pytest.mark.parametrize("name", mostly_deep(HIDDEN, ["load inertia", "sensor curvature"]))
 def test_a_hidden_effect_is_found(name):
     found = of_hidden(name)
     require_consistent(found)
@@ -148,7 +151,7 @@ def test_a_hidden_effect_is_found(name):
     assert found.unnamed is None
 
 
-@pytest.mark.parametrize("name", HIDDEN)
+@pytest.mark.parametrize("name", mostly_deep(HIDDEN, ["load inertia", "sensor curvature"]))
 def test_the_extended_model_predicts_an_unseen_recording(name):
     # the thesis's own validation, another noise, at the same rate: mains keep their phase
     drive = Drive(*Sequence.thesis(frequencies=(0.6,) * 5, periods=1).sample(100.0))
@@ -161,7 +164,7 @@ def test_the_extended_model_predicts_an_unseen_recording(name):
     assert errors[1] < 1.1 * NOISE
 
 
-@pytest.mark.parametrize("name", HIDDEN)
+@pytest.mark.parametrize("name", mostly_deep(HIDDEN, ["load inertia", "sensor curvature"]))
 def test_no_other_family_explains_as_much(name):
     first = of_hidden(name).rounds[0]
     assert first.base == ()
@@ -189,6 +192,7 @@ def test_missing_stress_vanishes_with_the_effect():
     assert after < 0.5 * before
 
 
+@pytest.mark.deep
 def test_a_single_event_is_left_out_of_predictions():
     # a load that slips by a tenth: whatever is found beside it has taken a part of it over
     slipped = replace(PLAIN, effects=effect("sudden change of force", stress=-200.0, moment=4.3))
@@ -232,6 +236,7 @@ def of_two_walks() -> Diagnosis:
     return diagnose([replace(r, name=f"run {i}") for i, r in enumerate(walking)], PLAIN, workers=1)
 
 
+@pytest.mark.deep
 def test_each_recording_has_its_own_drift():
     found = of_two_walks()
     require_consistent(found)
@@ -245,6 +250,7 @@ def test_each_recording_has_its_own_drift():
     assert all(3e-6 < e.value < 5e-5 for e in step.estimates)
 
 
+@pytest.mark.deep
 def test_missing_stress_uses_the_drift_of_its_own_recording():
     found = of_two_walks()
     assert all(s.is_noise for s in found.after)
@@ -252,6 +258,7 @@ def test_missing_stress_uses_the_drift_of_its_own_recording():
         assert np.sqrt(np.mean(after.stress**2)) < 0.5 * np.sqrt(np.mean(before.stress**2))
 
 
+@pytest.mark.deep
 def test_drift_of_single_recordings_is_left_out_of_predictions():
     found = of_two_walks()
     assert found.final.predicting.effects == ()
@@ -319,6 +326,7 @@ def test_a_slack_strip_is_found():
     assert [s.modulus for s in springs] == pytest.approx([40e3, 30e3], rel=0.03)
 
 
+@pytest.mark.deep
 def test_slack_explains_a_strip_whose_springs_do_not_stiffen():
     soft = replace(STRIP, network=Network.gent((40e3, 30e3), (1e4, 1e4), (2.0,)))
     hidden = replace(soft, effects=effect("slack", looseness=1.0))
@@ -338,6 +346,7 @@ def test_a_held_voltage_is_recognised():
     assert not diagnose([record], PLAIN, workers=1).held
 
 
+@pytest.mark.deep
 def test_a_held_voltage_is_recognised_beside_an_effect():
     drive = thesis_drive()
     record = record_of(plant("load inertia"), replace(drive, hold=True))
@@ -348,6 +357,7 @@ def test_a_held_voltage_is_recognised_beside_an_effect():
     assert found.final.cost == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.deep
 def test_masked_readings_do_not_influence_a_diagnosis():
     # two effects: the second is refitted only if its sensitivity promises something
     both = (*plant("sensor curvature").effects, *plant("mains interference").effects)

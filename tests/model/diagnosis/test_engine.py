@@ -137,6 +137,7 @@ def test_a_search_without_work_left_ends_with_what_it_has() -> None:
     assert any("computing budget" in note for note in found.notes)
 
 
+@pytest.mark.deep
 def test_a_search_keeps_what_it_has_fitted_when_its_work_ends(monkeypatch) -> None:
     races = []
 
@@ -164,6 +165,7 @@ def test_a_fit_in_which_the_work_ended_is_made_again(monkeypatch) -> None:
     assert search.without(fit, "sensor curvature").effects == ()
 
 
+@pytest.mark.deep
 def test_a_lag_that_may_be_the_sensors_own_is_said_to() -> None:
     late = record_of(replace(PLAIN, effects=effect("sensor delay", delay=4e-3)))
     found = diagnose([replace(late, lag_error=5e-3)], PLAIN, workers=1)
@@ -201,6 +203,7 @@ def test_a_bench_that_vibrates_is_told_by_its_line() -> None:
     assert found.verdict == "explained"
 
 
+@pytest.mark.deep
 def test_what_the_readings_at_rest_show_is_fitted_first() -> None:
     time = np.arange(400 + thesis_drive().time.size) / 100.0
     hums = after_rest(2e-5 * np.sin(2.0 * np.pi * 23.7 * time))

@@ -9,6 +9,7 @@ from dearig.model import effects
 from dearig.model.effects import EFFECTS
 from dearig.model.effects_contract import check_effect
 from dearig.model.errors import ModelError
+from tests.deep import mostly_deep
 from tests.tools.effect_plugin import FEW, add_distribution, run_with
 
 HEAD = '''"""A made effect."""
@@ -173,9 +174,9 @@ def worked_example():
     return source
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(900)  # the kernels are compiled with the made effects
-def test_the_contract_tells_what_is_wrong_with_each_made_effect(tmp_path):
+@pytest.mark.timeout(900)  # compiled, the kernels are compiled with the made effects
+@pytest.mark.parametrize("compiled", mostly_deep([False, True], [False]))
+def test_the_contract_tells_what_is_wrong_with_each_made_effect(compiled, tmp_path):
     """One test, since two processes that share the tests would each compile the kernels."""
     modules = {}
     for i, (name, body) in enumerate(BODIES.items()):
@@ -184,7 +185,7 @@ def test_the_contract_tells_what_is_wrong_with_each_made_effect(tmp_path):
         modules[f"made_effect_{i}"] = head + body
     modules["fading_drag"] = worked_example()
     add_distribution(tmp_path, "made-effects", modules)
-    lines = run_with(tmp_path, PROGRAM, compiled=True).splitlines()
+    lines = run_with(tmp_path, PROGRAM, compiled).splitlines()
     told = dict(line.split(": ", 1) for line in lines)
     # the worked example of the README keeps the contract
     expected = EXPECTED | {"fading drag": ""}

@@ -1,4 +1,7 @@
-"""Every effect: at its neutral values nothing, elsewhere what its physics says."""
+"""Every effect: at its neutral values nothing, elsewhere what its physics says.
+
+One piece: a short test for each effect, on the same films.
+"""
 
 import functools
 import math
@@ -49,6 +52,7 @@ from tests.tools.effect_oracle import (
     steps_at,
     weights_of,
 )
+from tests.tools.effect_plugin import FEW
 
 LENGTH = THESIS_FILM.length
 OF_SENSOR = [n for n in BY_VOLTAGE if EFFECTS[n].acts_on == "sensor"]
@@ -584,17 +588,20 @@ def test_an_effect_is_one_file(compiled, tmp_path):
     (tmp_path / "dearig" / "__init__.py").touch()
     copy = tmp_path / "dearig" / "model"
     shutil.copytree(package, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    (copy / "effects" / "constant_pull.py").write_text(NEW, encoding="utf-8")
+    (copy / "effects" / "library" / "mechanical" / "constant_pull.py").write_text(
+        NEW, encoding="utf-8"
+    )
     environment = {
         **os.environ,
         "PYTHONPATH": str(tmp_path),
         "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
         "NUMBA_DISABLE_JIT": "0" if compiled else "1",
     }
-    # compiled, one hook is enough: the kernels take half a minute
+    # compiled, one hook of few effects is enough: the kernels take half a minute
     use = USE
     if compiled:
-        use = "\n".join(line for line in USE.splitlines() if "more" not in line)
+        few = FEW.replace('("linear_drag"', '("constant_pull", "linear_drag"')
+        use = few + "\n".join(line for line in USE.splitlines() if "more" not in line)
     done = subprocess.run(
         [sys.executable, "-c", use],
         cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,

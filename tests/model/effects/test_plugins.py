@@ -66,49 +66,67 @@ def test_an_effect_may_be_imported_before_the_package_finds_it(tmp_path):
     assert (found, problems) == ("['lab drag: lab-effects 1.0']", "")
 
 
-@pytest.mark.parametrize(
-    ("source", "reason"),
-    [
-        ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
-        ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
-        ("x = 1", "it has no EFFECT of the class dearig.model.effects.Effect"),
-        (made_effect("linear drag"), "an effect of dearig is called 'linear drag' already"),
-        (
-            made_effect("lab drag").replace('family="drag"', 'family="magic"'),
-            "its family 'magic' is not one of load_inertia, drag",
-        ),
-        (
-            made_effect("lab drag").replace(", since, t)", ", since)"),
-            "its hook stress takes (c, k, m, j, lam, rate, lam0, since), not (c, k, m, j, lam, "
-            "rate, lam0, since, t)",
-        ),
-    ],
-    ids=["cannot be imported", "raises", "no effect", "name clashes", "family", "arguments"],
-)
-def test_an_effect_that_cannot_be_used_is_left_out(source, reason, tmp_path):
-    add_distribution(tmp_path, "lab-effects", {"lab_bad": source})
+#: Modules that cannot be used, by the name of each, with the reason that is told.
+UNUSABLE = {
+    "lab_import": (
+        "import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"
+    ),
+    "lab_raises": ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
+    "lab_empty": ("x = 1", "it has no EFFECT of the class dearig.model.effects.Effect"),
+    "lab_clash": (
+        made_effect("linear drag"), "an effect of dearig is called 'linear drag' already"
+    ),
+    "lab_family": (
+        made_effect("lab drag").replace('family="drag"', 'family="magic"'),
+        "its family 'magic' is not one of load_inertia, drag",
+    ),
+    "lab_arguments": (
+        made_effect("lab drag").replace(", since, t)", ", since)"),
+        "its hook stress takes (c, k, m, j, lam, rate, lam0, since), not (c, k, m, j, lam, "
+        "rate, lam0, since, t)",
+    ),
+}  # fmt: skip
+#: The same of hooks that do not compile.
+UNCOMPILED = {
+    "lab_name": (SOFTENED.format("nothing"), "its hook soften does not compile"),
+    "lab_two": (
+        SOFTENED.format("1.0, 2.0"), "its hook soften returns UniTuple(float64 x 2), not 1"
+    ),
+    "lab_plain": (
+        SOFTENED.format("1.0").replace("@jit", ""), "its hook soften is not compiled: decorate"
+    ),
+}  # fmt: skip
+
+
+def require_left_out(problems, reasons):
+    """Each module is left out with a sentence of its own, whatever else is left out."""
+    assert len(problems) == len(reasons)
+    for module, reason in reasons.items():
+        (problem,) = (p for p in problems if f"(module {module})" in p)
+        distribution = module.replace("_", "-")
+        assert problem.startswith(
+            f"The effect {module!r} of {distribution} 1.0 (module {module}) is left out: "
+        )
+        assert reason in problem
+        assert problem.endswith(f"Repair or uninstall {distribution} 1.0.")
+
+
+def test_effects_that_cannot_be_used_are_left_out_one_by_one(tmp_path):
+    for module, (source, _) in UNUSABLE.items():
+        add_distribution(tmp_path, module.replace("_", "-"), {module: source})
     add_distribution(tmp_path, "lab-more", {"lab_good": made_effect("good drag")})
-    found, problem, *_ = run_with(tmp_path, FOUND).split("\n")
+    found, *problems = run_with(tmp_path, FOUND).strip().split("\n")
     assert found == "['good drag: lab-more 1.0']"
-    assert problem.startswith(
-        f"The effect 'lab_bad' of lab-effects 1.0 (module lab_bad) is left out: {reason}"
-    )
-    assert problem.endswith("Repair or uninstall lab-effects 1.0.")
+    require_left_out(problems, {module: reason for module, (_, reason) in UNUSABLE.items()})
 
 
-@pytest.mark.parametrize(
-    ("more", "reason"),
-    [
-        (SOFTENED.format("nothing"), "its hook soften does not compile"),
-        (SOFTENED.format("1.0, 2.0"), "its hook soften returns UniTuple(float64 x 2), not 1"),
-        (SOFTENED.format("1.0").replace("@jit", ""), "its hook soften is not compiled: decorate"),
-    ],
-)
-def test_a_hook_that_does_not_compile_is_told(more, reason, tmp_path):
-    add_distribution(tmp_path, "lab-effects", {"lab_bad": made_effect("bad drag", more=more)})
-    found, problem, *_ = run_with(tmp_path, FOUND, compiled=True).split("\n")
+def test_hooks_that_do_not_compile_are_told(tmp_path):
+    for module, (more, _) in UNCOMPILED.items():
+        source = made_effect(f"{module} drag", more=more)
+        add_distribution(tmp_path, module.replace("_", "-"), {module: source})
+    found, *problems = run_with(tmp_path, FOUND, compiled=True).strip().split("\n")
     assert found == "[]"
-    assert reason in problem
+    require_left_out(problems, {module: reason for module, (_, reason) in UNCOMPILED.items()})
 
 
 def test_more_effects_than_places(tmp_path):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dearig.model.fitting.estimates import estimates_with_intervals, recentre
+from dearig.model.fitting.estimates import BY_CURVATURE, estimates_with_intervals, recentre
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Estimate
 from dearig.model.fitting.problem import Problem
@@ -73,3 +74,25 @@ def test_no_interval_is_narrower_than_with_all_others_known() -> None:
     for e, q, least in zip(fitted, quantities, alone, strict=True):
         least *= 0.9 * (e.value if q.logarithmic else 1.0)
         assert min(e.high - e.value, e.value - e.low) > least, e.name
+
+
+def test_profiles_end_when_they_are_asked_to() -> None:
+    problem, x, free = posed(PLAIN, record_of(PLAIN, thesis_drive(rate=100.0)))
+    found = descend(problem, x, ~free)
+    values = problem.layout.values(found.x)
+    points: list[float] = []
+    estimates, names, cov = estimates_with_intervals(
+        problem, values, ~free, points.append, lower_ends=False, ended=lambda: len(points) > 2
+    )
+    # one point more for each parameter, at which it is asked
+    assert len(points) <= 3 + free.sum()
+    fitted = [e for e, f in zip(estimates, free, strict=True) if f]
+    ended = [e for e in fitted if BY_CURVATURE in e.note]
+    assert len(ended) >= free.sum() - 1
+    for e in ended:
+        error = math.sqrt(cov[names.index(e.name), names.index(e.name)])
+        q = next(q for q in problem.layout.quantities if q.name == e.name)
+        if q.logarithmic:
+            assert e.high / e.value == pytest.approx(math.exp(1.96 * error / e.value), rel=1e-2)
+        else:
+            assert e.high - e.value == pytest.approx(1.96 * error, rel=1e-2)

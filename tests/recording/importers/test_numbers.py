@@ -290,7 +290,9 @@ def test_minutes_and_seconds_with_a_dot(
 def test_minutes_and_seconds_in_another_unit_are_asked(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"in s, but .* 41.00 follows 40.59.* --rate-Hz 1$"):
         imported(tmp_path, by_sixties(" (s)"))
-    with pytest.raises(InputError, match="--column time_min=Time "):
+    with pytest.raises(
+        InputError, match=r"seem to be minutes and seconds.* --column time_UNIT=Time "
+    ):
         imported(tmp_path, by_sixties(""))
 
 

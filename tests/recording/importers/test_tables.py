@@ -52,7 +52,7 @@ def test_a_sheet_is_chosen_or_asked_for(tmp_path: Path) -> None:
         Second=rows(table=2 * TABLE),
         Summary=rows(("run", "peak_kV"), np.array([[1, 2.3], [2, 4.6]])),
     )
-    with pytest.raises(InputError, match=r"--table takes one: First, Second\)\. .* --table First"):
+    with pytest.raises(InputError, match=r"--table takes one: First, Second\)\. .* --table TABLE$"):
         imported(path)
     np.testing.assert_allclose(taken(path, table="Second").time, 2 * TIME)
     with pytest.raises(
@@ -226,7 +226,7 @@ def test_what_looks_like_a_workbook_and_is_none(tmp_path: Path) -> None:
 def test_stretch_is_proposed_for_numbers_that_look_like_it(tmp_path: Path) -> None:
     table = np.column_stack([TIME, 1 + TIME, 20 * TIME])
     path = workbook(tmp_path / "in.xlsx", Log=table.tolist())
-    with pytest.raises(InputError, match="'stretch=#2' --column 'nominal_stress_kPa=#3'"):
+    with pytest.raises(InputError, match=r"stretch=COLUMN --column nominal_stress_MPa=COLUMN$"):
         imported(path)
     columns = {"time_s": "#1", "stretch": "#2", "nominal_stress_kPa": "#3"}
     assert taken(path, columns=columns).samples == ROWS

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from dearig.analysis.outcomes import pooled_rms
 from dearig.errors import InputError
+from dearig.model.readings.measures import errors
+from dearig.report.as_json import outcome_json
 from dearig.report.pages.html import write_demo_report, write_identify_report, write_validate_report
 from dearig.report.text.numbers import (
     NO_VALUE,
@@ -295,13 +298,29 @@ class TestWords:
         [
             (None, "the error cannot be compared with it"),
             (1e-6, "the model does not describe"),
-            (2.0e-6, "most of the residual is noise"),
+            (2.0e-6, "too few readings at rest"),
             (5e-6, "the residual is almost only noise"),
         ],
     )
     def test_against_the_noise(self, noise, words):
         outcome = identify_outcome(train=(actuator_comparison(noise=noise),))
         assert words in " ".join(identify_summary(outcome))
+
+    @pytest.mark.parametrize(("over", "rejected"), [(1.0, False), (1.3, True)])
+    def test_a_model_that_the_noise_at_rest_denies_is_called_rejected(self, over, rejected):
+        train, rng = actuator_comparison(noise=2e-6), np.random.default_rng(1)
+        left = 2e-6 * rng.standard_normal(train.time.size)
+        wave = np.sin(np.linspace(0.0, 60.0, left.size)) * (np.arange(left.size) >= 200)
+        model = train.measured * (np.arange(left.size) >= 200)
+        measured = model + left + 2e-6 * math.sqrt(2.0 * (over**2 - 1.0)) * wave
+        one = replace(
+            train, model=model, measured=measured, quiet_count=200, errors=errors(measured, model)
+        )
+        outcome = identify_outcome(train=(one,))
+        words, found = " ".join(identify_summary(outcome)), outcome_json(outcome)
+        assert ("The model is rejected" in words) == rejected
+        assert found["rejected"] is rejected
+        assert (found["misfit_p"] < 1e-3) == rejected
 
     def test_training_data_among_validation_are_called_so(self):
         outcome = validate_outcome(

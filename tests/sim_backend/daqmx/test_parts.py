@@ -10,13 +10,14 @@ import pytest
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend import daqmx
 from dearig.sim_backend.clock import ManualClock
+from dearig.sim_backend.daqmx.card.channels import AnalogInput
 from dearig.sim_backend.daqmx.card.errors import DaqmxError
+from dearig.sim_backend.daqmx.card.names import named
 from dearig.sim_backend.daqmx.card.state import CardState
-from dearig.sim_backend.daqmx.card.tasks import AnalogInput, Kind, Task
+from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.work import Samples
 from dearig.sim_backend.daqmx.digital.watchdogs import Watchdogs
-from dearig.sim_backend.daqmx.setup.names import named
 from dearig.sim_backend.daqmx.setup.timing import Timing
 
 

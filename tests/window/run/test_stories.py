@@ -29,6 +29,7 @@ from dearig.window.rig.page import RigPage
 from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from tests.deep import mostly_deep
 from tests.window.conftest import SHORT, press
 
 LEFT = Qt.MouseButton.LeftButton
@@ -151,7 +152,7 @@ SEGMENTS = {
 BACK = '[[segment]]\nkind = "ramp"\nto_kV = 0.0\nduration_s = 1.0\n'
 
 
-@pytest.mark.parametrize("kind", SEGMENTS)
+@pytest.mark.parametrize("kind", mostly_deep(SEGMENTS, ["half_sine", "hold", "steps", "chirp"]))
 def test_stop_ends_any_segment(
     qtbot: QtBot,
     quick_ramp: Session,
@@ -387,6 +388,7 @@ def resident() -> float:
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads /proc")
+@pytest.mark.deep
 def test_twenty_runs_leave_nothing_behind(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:

@@ -13,6 +13,7 @@ from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.session.settings import kept_texts, open_settings
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from tests.deep import mostly_deep
 
 DAMAGED = {
     "geometry cut": b"[General]\ngeometry=@ByteArray(\\x1\\xd9\\xd0\\xcb\\0\\x3",
@@ -35,12 +36,16 @@ DAMAGED = {
 }
 
 
-@pytest.mark.parametrize("text", DAMAGED.values(), ids=DAMAGED)
+#: Of each kind one: a value cut short, out of range, of another type, and no settings file.
+KEPT = ("geometry cut", "page far away", "unknown variants", "texts as lists", "layout", "zeros")
+
+
+@pytest.mark.parametrize("name", mostly_deep(DAMAGED, KEPT))
 def test_the_window_opens_whatever_the_settings_file_holds(
-    tmp_path: Path, qtbot: QtBot, text: bytes
+    tmp_path: Path, qtbot: QtBot, name: str
 ) -> None:
     ini = tmp_path / "dearig.ini"
-    ini.write_bytes(text)
+    ini.write_bytes(DAMAGED[name])
     prepare_plots()
     settings = QSettings(str(ini), QSettings.Format.IniFormat)
     window = MainWindow(Session(tmp_path, settings, theme=LIGHT))

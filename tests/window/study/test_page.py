@@ -189,6 +189,7 @@ def test_a_recording_that_ended_in_an_arc_is_marked_and_warned_of(session, keep,
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
+@pytest.mark.deep
 def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     window: MainWindow, session: Session, qtbot: QtBot
 ) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from dearig.errors import InputError
 from dearig.recording.importers.columns.chosen import LIKELY, Chosen, Pick, label_in
-from dearig.recording.importers.columns.guess import Guess, use_monitor
+from dearig.recording.importers.columns.guess import LENGTHS, PULLS, Guess, use_monitor
 from dearig.recording.importers.quantities.labels import (
     DIMENSIONS,
     Label,
@@ -137,9 +137,7 @@ def _suffices(chosen: Chosen, timed: bool) -> bool:
         return False
     if len(set(_sizes(chosen).values()) - {None}) > 1:
         return getattr(chosen.source, "cut_short", False)
-    film = there.keys() & {"stretch", "strain", "displacement"} and there.keys() & {
-        "nominal_stress", "force"
-    }  # fmt: skip
+    film = there.keys() & set(LENGTHS) and there.keys() & set(PULLS)
     return {"voltage", "displacement"} <= there.keys() or bool(film)
 
 
@@ -189,7 +187,7 @@ def _asked(
             f"is known here, and {target.name} asks for {target.unit}; give its scale, such as "
             f"{shlex.quote(f'{target.name}={column}*4')}, or *1 if it is in {target.unit}"
         )
-    if not label.unit:
+    if not label.unit or label.conflict == target.unit:
         return Pick(target, column, scale)
     wanted = "voltage" if target.raw else DIMENSIONS[target.quantity]
     if wanted not in label.dimensions:

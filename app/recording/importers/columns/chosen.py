@@ -13,7 +13,10 @@ from dearig.recording.importers.quantities.labels import Label, Target, label_of
 from dearig.recording.importers.quantities.units import Scale
 from dearig.recording.importers.source import Source
 
-__all__ = ["LIKELY", "Chosen", "Pick", "command_line", "label_in", "own_name"]
+__all__ = ["HOLE", "LIKELY", "UNIT_HOLE", "Chosen", "Pick", "command_line", "label_in", "own_name"]
+
+#: What stands in a printed command for a column, and for a unit, that only the user knows.
+HOLE, UNIT_HOLE = "COLUMN", "UNIT"
 
 #: Unit of a column whose name has none, in a proposal, by dimension.
 LIKELY = MappingProxyType(
@@ -32,6 +35,11 @@ class Pick:
     behind: str = ""  # what stands behind the column in a command line, such as *FACTOR
     #: what of it is a guess: "column", "unit" or "scale"; "" where it is sure
     doubt: str = ""
+    #: True where a printed command may not name the column, since only its place or a word of its
+    #: name speaks for it
+    is_open: bool = False
+    #: True where its unit is a guess
+    unit_open: bool = False
 
     @property
     def said(self) -> str:
@@ -49,7 +57,8 @@ class Chosen:
 
     ``unsure`` are sentences: while there is one, nothing may be imported. ``notes`` say what was
     found without being asked for. ``optional`` are quantities that a recording can do without, and
-    that nobody asked for. ``table_choices`` are the tables of which one must be chosen.
+    that nobody asked for. ``table_choices`` are the tables of which one must be chosen. ``missing``
+    are names of targets for which no column was found.
     """
 
     source: Source
@@ -59,6 +68,21 @@ class Chosen:
     optional: set[str] = field(default_factory=set)
     unsure: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+    @property
+    def template(self) -> dict[str, str]:
+        """Columns by target for a printed command, with holes for all that is not sure.
+
+        Run as it is, the command imports nothing that was merely guessed.
+        """
+        found: dict[str, str] = {}
+        for pick in self.picked.values():
+            name, column = pick.target.name, pick.column + pick.behind
+            if pick.unit_open:
+                name = f"{pick.target.quantity}_{UNIT_HOLE}"
+            found[name] = HOLE if pick.is_open else column
+        return found | dict.fromkeys(self.missing, HOLE)
 
     @property
     def pairs(self) -> dict[str, str]:
@@ -78,10 +102,16 @@ def command_line(
     return shlex.join([*words, *more])
 
 
+#: A name of several levels as pandas writes it: ('rig', 'voltage_kV').
+_LEVELS = re.compile(r"\((?:['\"][^'\"]*['\"], )+['\"]([^'\"]*)['\"]\)")
+
+
 def own_name(source: Source, column: str) -> str:
     """Return the name of ``column`` without the group or path that its format puts before it."""
     strip = getattr(source, "own_name", None)
     name = column if strip is None else strip(column)
+    if levels := _LEVELS.fullmatch(name):
+        name = levels[1]
     return re.sub(r" #\d+$", "", name)  # of a name that is there twice
 
 

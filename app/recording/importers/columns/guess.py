@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.importers.columns.chosen import LIKELY, Chosen, Pick, own_name
-from dearig.recording.importers.quantities.clock_numbers import by_sixties, epoch_unit
+from dearig.recording.importers.columns.compression import as_compression
+from dearig.recording.importers.columns.proposal import Proposal, counts, is_even, values_in
+from dearig.recording.importers.quantities.clock_numbers import by_sixties, counts_days, epoch_unit
 from dearig.recording.importers.quantities.labels import (
     DIMENSIONS,
     RAW,
@@ -20,6 +22,7 @@ from dearig.recording.importers.quantities.labels import (
     target_name,
     target_of,
 )
+from dearig.recording.importers.quantities.qualifiers import SHEAR
 from dearig.recording.importers.quantities.units import UNITS, Scale
 from dearig.recording.importers.source import listing
 
@@ -27,12 +30,17 @@ __all__ = ["Guess", "use_monitor"]
 
 #: Largest output in V of a monitor of an amplifier or of a laser: the range of the card's inputs.
 MONITOR_MAX = 10.0
-#: Largest voltage in kV of a film, and largest displacement in mm, in a proposal.
-FILM_MAX = 30.0
-#: Smallest and largest stretch of a film, and what its first value differs from 1, in a proposal.
-STRETCH_MIN, STRETCH_MAX, AT_REST = 0.2, 15.0, 1e-3
+#: Quantities from which a film's stretch comes, and those from which its stress does.
+LENGTHS = ("stretch", "strain", "true_strain", "displacement")
+PULLS = ("nominal_stress", "true_stress", "force")
+#: Quantities that only film data have.
+FILM = (*LENGTHS[:-1], *PULLS)
 #: Columns of one quantity whose values are compared, at most.
 COMPARED_MAX = 8
+#: Name of the time of a group of channels in a MAT file of asammdf.
+_OF_ASAMMDF = re.compile(r"DGM?\d+_timestamps")
+#: Columns of one quantity that a message says to be open, at most.
+ASKED_MAX = 3
 
 
 class Guess:
@@ -55,8 +63,10 @@ class Guess:
             self._take_if_sure("voltage_monitor")
         else:
             self._take("voltage_monitor")
-        actuator = "voltage" in there or "voltage_monitor" in there
-        if actuator:
+        film = any(self._like(q) for q in FILM)
+        if not film and not {"voltage", "voltage_monitor"} & there.keys():
+            self._take_asked("voltage")
+        if {"voltage", "voltage_monitor"} & there.keys():
             self._take("displacement", by_unit=True)
             for quantity in ("current", "temperature"):
                 self._take_if_sure(quantity)
@@ -65,80 +75,57 @@ class Guess:
                     self._take(quantity, only_own=True)
             use_monitor(self._chosen)
             return
-        if not {"stretch", "strain", "nominal_stress", "force"} & there.keys() and not any(
-            self._like(q) for q in ("stretch", "strain", "nominal_stress", "force")
-        ):
-            self._propose()
+        if not set(FILM) & there.keys() and not film and not any(map(self._asked, FILM)):
+            Proposal(self._chosen, self._labels, self._free, self._timed).fill()
             return
-        self._take_one(("stretch", "strain", "displacement"))
-        if not {"stretch", "strain"} & there.keys():
-            self._take("displacement", by_unit=True)
-        self._take_one(("nominal_stress", "force"))
-        self._take_one(("nominal_stress", "force"), by_unit=True)
+        self._check_sheared()
+        self._take_one(LENGTHS, ("displacement",))
+        self._take_one(PULLS, PULLS)
         self._take_if_sure("temperature")
+        as_compression(self._chosen, self._labels)
 
-    def _propose(self) -> None:
-        """Propose columns by their order, for an actuator: time, voltage, displacement."""
-        source, there = self._chosen.source, self._chosen.picked
-        names = [n for n in self._free if not re.search(r" #\d+$", n)]
-        if not names:
-            return
-        try:
-            values = source.read(names)
-        except InputError:
-            return
-        names = [n for n in names if values[n].size]
-        step = getattr(source, "step_s", None)
-        timed = self._timed or (step is not None and step(names) is not None)
-        if "time" in there or timed:
-            names = [n for n in names if not _counts(values[n])]
-        elif "time" not in there:
-            rising = [n for n in names if bool((np.diff(values[n]) > 0.0).all())]
-            if rising:
-                self._offer("time_s", rising[0])
-                names.remove(rising[0])
-        if "displacement" not in there and len(names) > 1 and _is_stretch(values[names[0]]):
-            self._offer("stretch", names[0])
-            self._offer("nominal_stress_kPa", names[1])
-            names = []
-        wanted = [q for q in ("voltage", "displacement") if q not in there and names]
-        if len(names) < len(wanted):
-            return
-        for quantity, column in zip(wanted, names, strict=False):
-            largest = float(np.nanmax(np.abs(values[column])))
-            small, large = ("kV", "V") if quantity == "voltage" else ("mm", "um")
-            # a film takes some kV and moves some mm
-            name = f"{quantity}_{small if largest < FILM_MAX else large}"
-            output = quantity == "voltage" and self._labels[column].unit == "V"
-            self._offer(name, column, output and largest <= MONITOR_MAX)
-        self._chosen.unsure.append(
-            f"the names {listing(source.names)} do not say what the columns are; the order does, "
-            f"perhaps"
-        )
+    def _check_sheared(self) -> None:
+        """Raise ``InputError`` if all columns of strain and stress are of shear."""
+        found = [n for n in self._free if set(FILM) & set(self._labels[n].asked)]
+        sheared = [n for n in found if self._labels[n].qualifier in SHEAR]
+        lengths = any(self._like(q) for q in (*FILM, "displacement"))
+        if sheared and sheared == found and not lengths and not self._chosen.picked.keys() & FILM:
+            raise InputError(
+                f"{self._chosen.source.path} has {listing(sheared)}: shear is not modelled here; "
+                f"film data are of tension or compression"
+            )
 
-    def _offer(self, name: str, column: str, output: bool = False) -> None:
-        """Propose ``column`` for the target ``name``; ``output``: in volts of an instrument."""
-        target = target_of(name)
-        label = self._labels[column]
-        foreign = (
-            output
-            or bool(label.unknown)
-            or (bool(label.unit) and DIMENSIONS[target.quantity] not in label.dimensions)
-        )
-        if label.unit and not foreign:
-            target = target_of(target_name(target.quantity, label.unit))
-        self._chosen.picked[target.quantity] = Pick(
-            target, column, target.scale, behind="*FACTOR" if foreign else "", doubt="column"
-        )
-        self._free.remove(column)
-
-    def _take_one(self, quantities: Sequence[str], by_unit: bool = False) -> None:
-        if any(q in self._chosen.picked for q in quantities):
-            return
-        for quantity in quantities:
-            self._take(quantity, by_unit=by_unit)
-            if quantity in self._chosen.picked:
+    def _take_one(self, quantities: Sequence[str], by_unit: Sequence[str]) -> None:
+        """Pick the first of ``quantities`` that a name says, or one ``by_unit``, or an open one."""
+        ways: list[tuple[str, Callable[[str], None]]] = [(q, self._take) for q in quantities]
+        ways += [(q, self._take_by_unit) for q in by_unit]
+        ways += [(q, self._take_asked) for q in quantities]
+        for quantity, take in ways:
+            if any(q in self._chosen.picked for q in quantities):
                 return
+            take(quantity)
+
+    def _take_asked(self, quantity: str, instead: Sequence[str] = ()) -> None:
+        """Propose the columns that may be ``quantity`` but for a word of their names."""
+        asked = self._asked(quantity)
+        if quantity in self._chosen.picked or not asked:
+            return
+        what = quantity.replace("_", " ")
+        for name in asked[:ASKED_MAX]:
+            self._chosen.unsure.append(
+                f"{name!r} was not taken for the {what}: {self._labels[name].qualifier!r} in its "
+                f"name leaves open whether it was measured, along the film and in time"
+            )
+        column = next(iter(instead), asked[0])
+        target = target_of(target_name(quantity, self._labels[column].unit or _likely(quantity)))
+        self._pick(target, column, target.scale, "column", is_open=True)
+
+    def _take_by_unit(self, quantity: str) -> None:
+        """Propose the columns whose unit alone says that they may be ``quantity``."""
+        found = self._of_unit(quantity)
+        if not found:
+            return
+        self._accept(quantity, found, "column", several=len(found) > 1)
 
     def _take_if_sure(self, quantity: str) -> None:
         """Pick the column of a quantity that a recording can do without, if it is sure."""
@@ -157,78 +144,130 @@ class Guess:
     def _take(self, quantity: str, only_own: bool = False, by_unit: bool = False) -> None:
         """Pick the one column that is ``quantity``, or note why none is sure.
 
-        With ``by_unit`` a column is proposed whose unit alone says what it may be.
+        With ``by_unit`` a column is proposed whose unit alone says what it may be, or one that is
+        it but for a word of its name.
         """
         if quantity in self._chosen.picked:
             return
         own = [n for n in self._free if _is_own(self._own(n), quantity)]
         found = own or ([] if only_own else self._like(quantity))
         found = found if len(found) < 2 else self._different(found)
-        doubt = ""
-        if not found and by_unit:
-            found, doubt = self._of_unit(quantity), "column"
         if not found:
+            if by_unit and self._asked(quantity):
+                self._take_asked(quantity, self._of_unit(quantity, left=False))
+            elif by_unit:
+                self._take_by_unit(quantity)
+            if quantity == "time" and quantity not in self._chosen.picked:
+                self._take_even()
             return
         if len(found) > 1:
             self._chosen.unsure.append(f"{quantity.replace('_', ' ')} may be {listing(found)}")
-            doubt = "column"
+        self._accept(quantity, found, "column" if len(found) > 1 else "", several=len(found) > 1)
+
+    def _take_even(self) -> None:
+        """Propose the one column without a quantity that rises in even steps for the time."""
+        source = self._chosen.source
+        step = getattr(source, "step_s", None)
+        free = [n for n in self._free if self._labels[n] == Label(n)]
+        if not free or len(free) > COMPARED_MAX or len(free) == len(self._labels):
+            return
+        if step is not None and step(list(source.names)) is not None:
+            return
+        values = values_in(self._chosen, free)
+        even = [n for n in values if is_even(values[n]) and not counts(values[n])]
+        if len(even) == 1:
+            self._chosen.unsure.append(
+                f"{even[0]!r} may be the time, since its values rise in even steps"
+            )
+            self._accept("time", even, "column", several=False)
+
+    def _accept(self, quantity: str, found: Sequence[str], doubt: str, several: bool) -> None:
+        """Pick the first of ``found``, in the unit that it names."""
         column = found[0]
         label = self._labels[column]
-        if own:
+        if _is_own(self._own(column), quantity):
             target = target_of(self._own(column))
-            self._pick(target, column, target.scale, doubt)
+            self._pick(target, column, target.scale, doubt, is_open=several)
         elif label.raw == quantity:
-            self._pick_raw(quantity, column, label)
+            self._pick_raw(quantity, column, label, several)
         elif label.unknown:
-            likely = target_name(quantity, LIKELY[DIMENSIONS[quantity]])
+            likely = target_name(quantity, _likely(quantity))
             self._chosen.unsure.append(
                 f"the unit {label.unknown!r} of {column!r} is not known: its scale is needed, as "
                 f"{shlex.quote(f'{likely}={column}*FACTOR')}"
             )
-            self._propose_scaled(target_of(likely), column)
+            self._propose_scaled(target_of(likely), column, several)
+        elif label.conflict:
+            self._chosen.unsure.append(
+                f"{column!r} is in {label.unit} by its name and in {label.conflict} by the unit "
+                f"that the file gives beside it"
+            )
+            target = target_of(target_name(quantity, label.unit))
+            self._pick(target, column, target.scale, doubt or "unit", is_open=several, unit=True)
         elif not label.unit and DIMENSIONS[quantity] not in ("strain", "stretch"):
             likely, why = self._unit_by_values(quantity, column)
             target = target_of(target_name(quantity, likely))
             if why:
                 self._chosen.notes.append(f"{column!r} {why}")
             else:
-                self._chosen.unsure.append(f"{column!r} names no unit")
-            self._pick(target, column, target.scale, doubt or ("" if why else "unit"))
+                written = "; its values seem to be minutes and seconds" if likely == "min" else ""
+                self._chosen.unsure.append(f"{column!r} names no unit{written}")
+            self._pick(
+                target, column, target.scale, doubt or ("" if why else "unit"), is_open=several,
+                unit=not why,
+            )  # fmt: skip
         else:
             target = target_of(target_name(quantity, label.unit or "1"))
-            if quantity == "strain" and not label.unit:
+            open_unit = DIMENSIONS[quantity] == "strain" and not label.unit
+            if open_unit:
                 self._chosen.notes.append(
                     f"{column!r} names no unit: it is taken as a part of the length, not as %"
                 )
-            open_unit = quantity == "strain" and not label.unit
-            self._pick(target, column, target.scale, doubt or ("unit" if open_unit else ""))
+            self._pick(
+                target, column, target.scale, doubt or ("unit" if open_unit else ""),
+                is_open=several, unit=open_unit,
+            )  # fmt: skip
 
     def _unit_by_values(self, quantity: str, column: str) -> tuple[str, str]:
         """Return the likely unit of a column that names none, and why if it is sure."""
-        likely = LIKELY[DIMENSIONS[quantity]]
+        likely = _likely(quantity)
         if quantity != "time":
             return likely, ""
         values = self._chosen.source.read([column])[column]
+        if _OF_ASAMMDF.fullmatch(self._own(column)):
+            return "s", "is in s, as asammdf writes it"
         if unit := epoch_unit(values):
             return unit, f"counts from 1970 in {unit}, by its values"
+        if counts_days(values):
+            return "d", "counts days from 1900, by its values"
         return "min" if by_sixties(values) is not None else likely, ""
 
-    def _of_unit(self, quantity: str) -> list[str]:
-        """Return the one free column with a unit of ``quantity``, or the only one that is left.
+    def _of_unit(self, quantity: str, left: bool = True) -> list[str]:
+        """Return the free columns with a unit of ``quantity``, or the only one that is ``left``.
 
         Says that it is a guess.
         """
-        labels = {n: self._labels[n] for n in self._free if not self._labels[n].quantities}
+        labels = {
+            n: label for n in self._free
+            if not (label := self._labels[n]).quantities and not label.qualifier
+        }  # fmt: skip
         found = [n for n, label in labels.items() if DIMENSIONS[quantity] in label.dimensions]
+        found = found if len(found) < 2 else self._different(found)
         why = "by its unit alone"
-        if not found and quantity != "time":
+        if not found and quantity != "time" and left:
             found = [n for n, label in labels.items() if not label.unit]
             why = "because no other column is left"
-        if len(found) != 1:
-            return []
+            found = found if len(found) == 1 else []
         what = quantity.replace("_", " ")
-        self._chosen.unsure.append(f"{found[0]!r} may be the {what}, {why}")
+        if len(found) == 1:
+            self._chosen.unsure.append(f"{found[0]!r} may be the {what}, {why}")
+        elif found:
+            self._chosen.unsure.append(f"the {what} may be {listing(found)}, by their unit alone")
         return found
+
+    def _asked(self, quantity: str) -> list[str]:
+        """Return the columns that are ``quantity`` but for a word of their names."""
+        return [n for n in self._free if quantity in self._labels[n].asked]
 
     def _own(self, name: str) -> str:
         return own_name(self._chosen.source, name)
@@ -241,7 +280,9 @@ class Guess:
             if quantity in self._labels[n].quantities or self._labels[n].raw == quantity
         ]
         with_unit = [n for n in found if self._labels[n].unit]
-        return with_unit or found
+        # in its own unit, and not in the volts of an instrument
+        own = [n for n in with_unit if quantity in self._labels[n].quantities]
+        return own or with_unit or found
 
     def _different(self, names: list[str]) -> list[str]:
         """Return ``names`` without columns that repeat another one's values, if they are few."""
@@ -257,37 +298,42 @@ class Guess:
                 kept.append(name)
         return kept
 
-    def _pick_raw(self, quantity: str, column: str, label: Label) -> None:
+    def _pick_raw(self, quantity: str, column: str, label: Label, several: bool) -> None:
         """Pick an instrument's output in volts; without a rig file its scale is not known."""
         volts = self._chosen.source.read([column])[column]
         largest = float(np.nanmax(np.abs(volts))) if volts.size else 0.0
         at_film = UNITS["voltage"][label.unit].times * largest > MONITOR_MAX
         if quantity == "voltage_monitor" and at_film:
             target = target_of(target_name(quantity, label.unit))
-            self._pick(target, column, target.scale)
+            self._pick(target, column, target.scale, is_open=several)
             return
         target = target_of(next(name for name, q in RAW.items() if q == quantity))
         if quantity in self._raw and label.unit == "V":
             self._chosen.notes.append(f"the rig file scales {column!r} from volts at the card")
-            self._pick(target, column, self._raw[quantity])
+            self._pick(target, column, self._raw[quantity], is_open=several)
             return
-        likely = target_name(quantity, LIKELY[DIMENSIONS[quantity]])
+        likely = target_name(quantity, _likely(quantity))
         self._chosen.unsure.append(
             f"{column!r} is the output of an instrument in {label.unit}, up to {largest:.3g}: its "
             f"scale is needed, in --rig-file or as {shlex.quote(f'{likely}={column}*FACTOR')}"
         )
-        self._propose_scaled(target_of(likely), column)
+        self._propose_scaled(target_of(likely), column, several)
 
-    def _propose_scaled(self, target: Target, column: str) -> None:
+    def _propose_scaled(self, target: Target, column: str, several: bool) -> None:
         """Propose ``column`` for ``target``, with a scale that only the user knows."""
         self._chosen.source.check(column)
-        proposed = Pick(target, column, Scale(), behind="*FACTOR", doubt="scale")
+        proposed = Pick(target, column, Scale(), behind="*FACTOR", doubt="scale", is_open=several)
         self._chosen.picked[target.quantity] = proposed
         self._free.remove(column)
 
-    def _pick(self, target: Target, column: str, scale: Scale, doubt: str = "") -> None:
+    def _pick(
+        self, target: Target, column: str, scale: Scale, doubt: str = "", *,
+        is_open: bool = False, unit: bool = False,
+    ) -> None:  # fmt: skip
         self._chosen.source.check(column)
-        self._chosen.picked[target.quantity] = Pick(target, column, scale, doubt=doubt)
+        self._chosen.picked[target.quantity] = Pick(
+            target, column, scale, doubt=doubt, is_open=is_open, unit_open=unit
+        )
         self._free.remove(column)
 
 
@@ -306,15 +352,8 @@ def use_monitor(chosen: Chosen) -> None:
     )
 
 
-def _is_stretch(values: np.ndarray) -> bool:
-    """Return True if ``values`` seem to be a stretch: 1 at the start, and some times 1 later."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    return abs(float(values[0]) - 1.0) < AT_REST and low > STRETCH_MIN and 1.0 < high < STRETCH_MAX
-
-
-def _counts(values: np.ndarray) -> bool:
-    """Return True if ``values`` number the rows."""
-    return bool((np.diff(values) == 1.0).all())
+def _likely(quantity: str) -> str:
+    return LIKELY[DIMENSIONS[quantity]]
 
 
 def _is_own(name: str, quantity: str) -> bool:

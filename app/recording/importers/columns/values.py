@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.content.timestamps import not_forward
 from dearig.recording.importers.columns.chosen import Chosen, Pick
+from dearig.recording.importers.columns.guess import LENGTHS, PULLS
+from dearig.recording.importers.columns.markers import markers_in
 from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
+from dearig.recording.importers.columns.time_faults import (
+    check_forward,
+    one_clock,
+)
 from dearig.recording.importers.quantities.clock_numbers import by_sixties
 from dearig.recording.importers.quantities.labels import names_of, suggestion
-from dearig.recording.importers.source import GapError, NeedsOptionError, listing
+from dearig.recording.importers.source import (
+    GapError,
+    NeedsOptionError,
+    Source,
+    listing,
+    skip_or_refuse,
+)
 
 __all__ = ["Values", "values_of"]
 
@@ -27,6 +38,8 @@ OPTIONAL = MappingProxyType(
         "temperature": "temperature",
     }
 )
+#: Quantities that an instrument measures, which writes a marker where it has no reading.
+_MARKED = frozenset({"displacement", "force", "nominal_stress", "strain", "stretch", "current"})
 #: Time in s above which a first time stamp counts from a fixed day, not from the start of a run.
 LONG_AGO = 1e7
 
@@ -55,7 +68,6 @@ def values_of(
     can be.
     """
     values = Values(_kind(chosen), {}, notes=list(chosen.notes))
-    values.notes += getattr(chosen.source, "notes", ())
     if values.kind == "actuator":
         if "force" in chosen.picked:
             values.warnings.append("the force was not used: actuator data have none")
@@ -79,6 +91,7 @@ def values_of(
         found["stretch"] = 1.0 + found.pop("displacement") / (specimen.gauge_length_mm / 1e3)
     if specimen.area_mm2 is not None and "force" in found:
         found["nominal_stress"] = found.pop("force") / (specimen.area_mm2 / 1e6)
+    _from_true(found, values)
     low = np.flatnonzero(found["stretch"] <= 0.0)
     if low.size:
         raise InputError(
@@ -89,10 +102,30 @@ def values_of(
     return values
 
 
+def _from_true(found: dict[str, np.ndarray], values: Values) -> None:
+    """Convert true strain and true stress. Changes ``found`` and the notes.
+
+    True strain is the logarithm of the stretch. A film keeps its volume, so that its cross-section
+    is that at rest over the stretch, however it is held.
+    """
+    if "true_strain" in found:
+        found["stretch"] = np.exp(found.pop("true_strain"))
+        values.notes.append("the stretch is computed from the true strain, its logarithm")
+    if "true_stress" in found:
+        found["nominal_stress"] = found.pop("true_stress") / found["stretch"]
+        values.notes.append(
+            "the nominal stress is the true stress over the stretch, of a film that keeps its "
+            "volume"
+        )
+
+
 def _kind(chosen: Chosen) -> str:
     there = chosen.picked.keys()
     path = chosen.source.path
-    film = [q for q in ("stretch", "strain", "nominal_stress") if q in there]
+    film = [
+        q for q in ("stretch", "strain", "true_strain", "nominal_stress", "true_stress")
+        if q in there
+    ]  # fmt: skip
     if "voltage" in there and film:
         raise InputError(
             f"{path} has both voltage and {' and '.join(film)}: actuator data are driven by "
@@ -121,8 +154,8 @@ def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[s
     Raises ``NeedsOptionError`` for a size of the specimen that is missing, for both at once.
     """
     there, told = chosen.picked, specimen_from_header(getattr(chosen.source, "block", ()))
-    length = next((q for q in ("stretch", "strain", "displacement") if q in there), None)
-    pull = next((q for q in ("nominal_stress", "force") if q in there), None)
+    length = next((q for q in LENGTHS if q in there), None)
+    pull = next((q for q in PULLS if q in there), None)
     if length is None:
         raise _no_column(chosen, "stretch", "or displacement with --gauge-length-mm")
     if pull is None:
@@ -184,6 +217,8 @@ def _read(
     columns = [pick.column for pick in picked.values()]
     step = _step(chosen, columns, rate_Hz)
     raw = _read_columns(chosen, picked, values)
+    values.notes += getattr(source, "notes", ())
+    values.warnings += getattr(source, "doubts", ())
     columns = [pick.column for pick in picked.values()]
     sizes = {column: raw[column].size for column in columns}
     size = min(sizes.values())
@@ -211,7 +246,12 @@ def _read(
         | {"time": "time"}
         | {q: pick.column for q, pick in picked.items() if q == "time"}
     )
-    good = _good_rows(chosen, table, names, skip)
+    good = _unmarked(chosen, table, picked, values)
+    if "time" in picked and _is_clock(source, picked["time"].column):
+        table["time"], notes, doubts = one_clock(table["time"], source.row)
+        values.notes += notes
+        values.warnings += doubts
+    good = _good_rows(chosen, table, names, skip, good)
     if not good.all():
         table = {q: column[good] for q, column in table.items()}
     if "time" in picked:
@@ -227,6 +267,11 @@ def _read(
         values.notes.append(f"time is counted from the first time stamp, {first:.3f} s")
     _note_left_out(chosen, values, good)
     return found
+
+
+def _is_clock(source: Source, column: str) -> bool:
+    """Return True for a column of dates and times of day."""
+    return getattr(source, "labels", {}).get(column) == "time"
 
 
 def _counted_by_sixties(chosen: Chosen, pick: Pick, time: np.ndarray, values: Values) -> np.ndarray:
@@ -330,41 +375,61 @@ def _step(chosen: Chosen, columns: Sequence[str], rate_Hz: float | None) -> floa
     return float(step)
 
 
-def _good_rows(
-    chosen: Chosen, table: dict[str, np.ndarray], names: dict[str, str], skip: bool
+def _place(source: Source, good: np.ndarray) -> Callable[[int], str]:
+    """Return a function for the place in the file of one of the ``good`` rows."""
+    kept = np.flatnonzero(good)
+    return lambda at: source.row(int(kept[at]))
+
+
+def _unmarked(
+    chosen: Chosen, table: dict[str, np.ndarray], picked: Mapping[str, Pick], values: Values
 ) -> np.ndarray:
-    """Return which rows are finite and go forward in time, (n,) bool.
+    """Return which rows have no marker for a missing reading, (n,) bool. Changes the warnings."""
+    good = np.ones(table["time"].size, dtype=bool)
+    for quantity in _MARKED & table.keys():
+        marked, found = markers_in(table[quantity])
+        if found:
+            good &= ~marked
+            shown = " and ".join(f"{value:.9g}" for value in found)
+            first = chosen.source.row(int(np.argmax(marked)))
+            values.warnings.append(
+                f"{int(marked.sum())} readings of {picked[quantity].column!r} are {shown}, far off "
+                f"all others, first in {first}: that stands for "
+                f"no reading, and the rows are left out"
+            )
+    return good
+
+
+def _good_rows(
+    chosen: Chosen, table: dict[str, np.ndarray], names: dict[str, str], skip: bool,
+    good: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Return which of the ``good`` rows are finite and go forward in time, (n,) bool.
 
     Raises ``InputError`` for the first other one unless ``skip``.
     """
-    source = chosen.source
-    good = np.ones(table["time"].size, dtype=bool)
+    source, marked = chosen.source, ~good
+    good = good.copy()
     finite = {}
     if not getattr(source, "is_finite", False):
-        finite = {quantity: np.isfinite(column) for quantity, column in table.items()}
+        finite = {q: np.isfinite(column) | marked for q, column in table.items()}
     for column in finite.values():
         good &= column
-    if not skip and not good.all():
-        at = int(np.argmin(good))
+    bad = ~good & ~marked
+    if not skip and bad.any():
+        at = int(np.argmax(bad))
         quantity = next(q for q in table if not finite[q][at])
         cell = getattr(source, "cell", None)
         wrong = "" if cell is None else cell(at, names[quantity])
-        raise NeedsOptionError(
+        raise skip_or_refuse(
             f"{source.path}, {source.row(at)}, column {names[quantity]!r}: "
-            f"{wrong or f'{table[quantity][at]} is not a finite number'}; --skip-bad-rows leaves "
-            f"such rows out",
-            "--skip-bad-rows",
+            f"{wrong or f'{table[quantity][at]} is not a finite number'}",
+            int(bad.sum()),
+            good.size,
         )
     seconds = table["time"]
     if not skip:
-        if (back := not_forward(seconds)) is not None:
-            at, how = back
-            raise NeedsOptionError(
-                f"{source.path}, {source.row(at)}, column {names['time']!r}: time {how}, from "
-                f"{seconds[at - 1]:.9g} to {seconds[at]:.9g}; --skip-bad-rows leaves such rows "
-                f"out, and --rate-Hz replaces the time of evenly spaced samples",
-                "--skip-bad-rows",
-            )
+        check_forward(seconds[good], names["time"], _place(source, good), source.path)
         return good
     latest = np.maximum.accumulate(np.where(good, seconds, -np.inf))
     good[1:] &= seconds[1:] > latest[:-1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import datetime
 
@@ -14,7 +14,7 @@ from dearig.recording.importers.quantities.moments import OpenDatesError, day_fi
 from dearig.recording.importers.quantities.text_numbers import GROUPED, MINUS
 from dearig.recording.importers.source import NeedsOptionError
 
-__all__ = ["complaint_about", "number_in", "with_order"]
+__all__ = ["cell_of", "complaint_about", "number_in", "with_order"]
 
 #: A cell is quoted in messages up to this length.
 SHOWN = 30
@@ -22,6 +22,13 @@ SHOWN = 30
 
 #: Sign before the exponent of a number of double precision in Fortran.
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d+$)")
+
+
+def cell_of(cells: Sequence[str], column: Column) -> str:
+    """Return the cell of ``column``; of a time of day, with the date that stands beside it."""
+    if column.date_place is None:
+        return cells[column.place]
+    return f"{cells[column.date_place].removesuffix(' 00:00:00')} {cells[column.place]}".strip()
 
 
 def number_in(cell: str, column: Column) -> float | None:

@@ -168,8 +168,7 @@ class _Sheet:
             if (at := index - self.layout.first) < 0:
                 continue
             for column in columns:
-                cell = row[column.place] if column.place < len(row) else None
-                number, wrong = _number(cell, column)
+                number, wrong = _number(_cell_of(row, column), column)
                 numbers[column.place].append(number)
                 if wrong and len(self._wrong) < TOLD_MAX:
                     self._wrong[column.place, at] = wrong
@@ -179,8 +178,7 @@ class _Sheet:
         """Return ``column`` with the order of day and month that all its texts say."""
         if not column.is_open:
             return column
-        cells = (row[column.place] for row in self._rows(ROWS_MAX, values=True)
-                 if column.place < len(row))  # fmt: skip
+        cells = (_cell_of(row, column) for row in self._rows(ROWS_MAX, values=True))
         return with_order(column, (cell.strip() for cell in cells if isinstance(cell, str)))
 
     def _rows(self, most: int, values: bool) -> Iterator[Sequence[Cell]]:
@@ -245,6 +243,15 @@ def _number(cell: Cell, column: Column) -> tuple[float, str]:
         told = cell if isinstance(cell, str) else text
         return math.nan, complaint_about(told.strip(), number)
     return number, ""
+
+
+def _cell_of(row: Sequence[Cell], column: Column) -> Cell:
+    """Return the cell of ``column``; of a time of day, with the date that stands beside it."""
+    cell = row[column.place] if column.place < len(row) else None
+    if column.date_place is None or cell is None:
+        return cell
+    day = row[column.date_place] if column.date_place < len(row) else None
+    return f"{_text(day).removesuffix(' 00:00:00')} {_text(cell)}"
 
 
 def _has_number(row: Sequence[Cell]) -> bool:

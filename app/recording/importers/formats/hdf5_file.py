@@ -14,7 +14,16 @@ from dearig.input_file import open_input
 from dearig.recording.content.layout import FORMAT
 from dearig.recording.content.safe import Refused, check_heaps, checked, item
 from dearig.recording.files import in_words, one_line
+from dearig.recording.importers.formats.hdf5_attributes import texts_in as _texts
+from dearig.recording.importers.formats.hdf5_attributes import unpacked
 from dearig.recording.importers.formats.mat_file import OBJECTS
+from dearig.recording.importers.formats.pandas_hdf5 import (
+    block_names,
+    field_names,
+    index_name,
+    is_index_group,
+    time_kind,
+)
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.units import unit_of
@@ -24,15 +33,19 @@ __all__ = ["IMPORTER", "Hdf5File"]
 
 #: Objects that are looked at, depth of groups, and columns of a matrix, at most.
 OBJECTS_MAX, DEEPEST, MATRIX_MAX = 10_000, 16, 256
-#: Bytes of an attribute that is read.
-ATTRIBUTE_MAX = 2**14
+#: Rows of a matrix that are columns of it, at most: a measurement has more values.
+ROWS_AS_COLUMNS = 16
+#: Values of a range that is stored as its start, step and end, at most.
+RANGE_MAX = 10**8
 #: Names of datasets that say nothing: their group names them.
 _GENERIC = frozenset({"data", "raw", "samples", "signal", "value", "values", "y"})
+#: Names of fields that say nothing beside the name of the dataset that they are fields of.
+_GENERIC_FIELDS = _GENERIC - {"y"}
 _UNITS = ("units", "unit", "Units", "Unit", "UNITS", "unit_string")
 _LABELS = ("long_name", "label", "description", "name")
 _COLUMNS = ("columns", "column_names", "channels", "channel_names", "names", "labels")
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_MATLAB = b"MATLAB 7.3 MAT-file"
+_BEHIND = 512  # bytes of text before a MAT file of version 7.3
 
 
 class Hdf5File(StoredColumns):
@@ -45,7 +58,9 @@ class Hdf5File(StoredColumns):
     def __init__(self, path: Path) -> None:
         try:
             with open_input(path) as file:
-                matlab = file.read(len(_MATLAB)) == _MATLAB
+                head = file.read(_BEHIND + len(_SIGNATURE))
+                # the text before it may name another version
+                matlab = head.startswith(b"MATLAB") and head.startswith(_SIGNATURE, _BEHIND)
         except OSError as error:
             raise InputError(f"{path} cannot be read: {in_words(error)}") from error
         what = "a MAT file of version 7.3" if matlab else "an HDF5 file"
@@ -102,6 +117,8 @@ class _Walk:
                 if "MATLAB_object_decode" in found.attrs:
                     self.objects = True
                     continue
+                if is_index_group(found):
+                    continue
                 self._check_foreign(found)
                 yield from self._in_group(found, inside, depth + 1)
             elif found is not None:
@@ -150,43 +167,86 @@ class _Walk:
         known = unit_of(unit)
         if axis and known and "time" in known[1]:
             label = "time"
+        unpack = unpacked(data)
+        if unpack is not None and {"scale_factor", "add_offset"} & set(data.attrs):
+            self.notes.append(f"{path!r} is scaled by its scale_factor and add_offset")
         shape = tuple(n for n in data.shape if n != 1)
         if len(shape) < 2:
+            kind = time_kind(data, "kind")
+            if "pandas_type" in data.parent.attrs:
+                own = index_name(data.parent, data, own) or own
             yield (
                 path,
-                Stored(self._loader(data.name, _flat), int(data.size), own, unit, label, group),
-            )
+                Stored(
+                    self._loader(data.name, _flat, unpack, kind), int(data.size), own,
+                    "s" if kind else unit, "time" if kind[:1] == "M" else label, group,
+                ),
+            )  # fmt: skip
             return
         if len(shape) > 2 or len(data.shape) > 2:
             return
         rows, width = data.shape[::-1] if self._matlab else data.shape
+        turned = self._matlab
+        if rows < width and rows <= ROWS_AS_COLUMNS:
+            rows, width, turned = width, rows, not turned
         names = next((n for key in _COLUMNS if len(n := _texts(data, key)) == width), [])
+        names = names or block_names(data.parent, data.name.rpartition("/")[2], width)
+        kind = time_kind(data, "value_type")
+        axes = [_texts(data.parent, key)[:1] for key in ("xlabel", "xunit", "ylabel", "yunit")]
+        xy = width <= 4 and all(axes) and own.startswith("xy")
         for place in range(width if width <= MATRIX_MAX else 0):
             inside = f"{path}{self._between}{names[place]}" if names else f"{path}[{place}]"
+            own_name = names[place].rpartition("/")[2] if names else f"{own}[{place}]"
+            if xy and place < 2:  # rows x and y of a curve, then their errors
+                (label,), (unit,) = axes[2 * place : 2 * place + 2]
+            elif xy:
+                label = unit = ""
             yield inside, Stored(
-                self._loader(data.name, _row(place) if self._matlab else _column(place)), rows,
-                names[place] if names else f"{own}[{place}]", unit, label, path if names else group,
+                self._loader(data.name, _row(place) if turned else _column(place), unpack, kind),
+                rows, own_name, "s" if kind else unit, "time" if kind[:1] == "M" else label,
+                path if names else group,
             )  # fmt: skip
 
     def _in_fields(self, data: h5py.Dataset, path: str) -> Iterator[tuple[str, Stored]]:
         if data.ndim != 1:
+            if data.shape == () and {"base", "limit", "increment"} <= set(data.dtype.names):
+                yield from self._in_range(data, path)
             return
         for name in data.dtype.names[:MATRIX_MAX]:
             kind = data.dtype[name]
             if kind.base.kind not in "fiu" or len(kind.shape) > 1:
                 continue
             places = range(min(kind.shape[0], MATRIX_MAX)) if kind.shape else [None]
-            for place in places:
-                inside = f"{path}{self._between}{name}" + ("" if place is None else f"[{place}]")
+            names = [name] if not kind.shape else (
+                field_names(data.parent, data, name, kind.shape[0])
+                or [f"{name}[{place}]" for place in places]
+            )  # fmt: skip
+            times = time_kind(data, f"{name}_kind")
+            for place, called in zip(places, names, strict=False):
+                own = called.rpartition("/")[2]
+                if name == "index" and "pandas_type" in data.parent.attrs:
+                    own = index_name(data.parent, data, name) or own
+                elif own.lower() in _GENERIC_FIELDS:
+                    own = path.rpartition(self._between)[2]
                 yield (
-                    inside,
+                    f"{path}{self._between}{called}",
                     Stored(
-                        self._loader(data.name, _field(name, place)),
-                        int(data.size),
-                        name,
-                        table=path,
+                        self._loader(data.name, _field(name, place), None, times),
+                        int(data.size), own, "s" if times else "",
+                        "time" if times[:1] == "M" else "", path,
                     ),
-                )
+                )  # fmt: skip
+
+    def _in_range(self, data: h5py.Dataset, path: str) -> Iterator[tuple[str, Stored]]:
+        """Yield the values of a range, which Octave stores as base, limit and increment."""
+        base, limit, step = (float(data[()][n]) for n in ("base", "limit", "increment"))
+        count = (limit - base) / step if step else 0.0
+        if not 0.0 < count < RANGE_MAX:
+            return
+        size = round(count) + 1 if abs(count - round(count)) < 1e-6 else int(count) + 1
+        table = path.rpartition(self._between)[0]
+        own = (table if path.endswith("value") else path).rpartition(self._between)[2]
+        yield path, Stored(lambda: base + step * np.arange(size), size, own)
 
     def _in_cells(self, data: h5py.Dataset, path: str, depth: int) -> Iterator[tuple[str, Stored]]:
         """Yield the columns behind references: cells, and fields of an array of structs."""
@@ -215,13 +275,20 @@ class _Walk:
                 yield from self._in_dataset(found, inside, table, depth + 1, axis=False)
 
     def _loader(
-        self, name: str, pick: Callable[[h5py.Dataset], np.ndarray]
+        self,
+        name: str,
+        pick: Callable[[h5py.Dataset], np.ndarray],
+        unpack: Callable[[np.ndarray], np.ndarray] | None = None,
+        times: str = "",
     ) -> Callable[[], np.ndarray]:
         path = self._path
 
         def load() -> np.ndarray:
             with h5py.File(path, "r", locking=False) as file:
-                return pick(file[name])
+                values = pick(file[name])
+            if times:
+                return values.astype(np.int64).view(times)
+            return values if unpack is None else unpack(values)
 
         return load
 
@@ -244,21 +311,6 @@ def _field(name: str, place: int | None) -> Callable[[h5py.Dataset], np.ndarray]
         return values if place is None else values[:, place]
 
     return pick
-
-
-def _texts(owner: h5py.Group | h5py.Dataset, name: str) -> list[str]:
-    """Return the texts in the attribute ``name`` of ``owner``; none if it is something else."""
-    if name not in owner.attrs:
-        return []
-    attribute = owner.attrs.get_id(name)
-    if attribute.get_storage_size() > ATTRIBUTE_MAX:
-        return []
-    try:
-        found = np.ravel(owner.attrs[name]).tolist()
-    except PARSER_FAILURES:
-        return []
-    texts = [t.decode("utf-8", "replace") if isinstance(t, bytes) else t for t in found]
-    return [text for text in texts if isinstance(text, str)]
 
 
 def _default(file: h5py.File) -> str | None:

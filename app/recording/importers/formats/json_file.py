@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.input_file import open_input
+from dearig.input_file import open_input, parse_json
 from dearig.recording.files import in_words
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
@@ -71,9 +71,9 @@ def _content(path: Path) -> tuple[Json, bool]:
     try:
         text = raw.decode(encoding_of(raw[: 2**16], path))
         try:
-            return json.loads(text), False
+            return parse_json(text), False
         except json.JSONDecodeError:
-            rows = [json.loads(line) for line in text.splitlines() if line.strip()]
+            rows = [parse_json(line) for line in text.splitlines() if line.strip()]
             if len(rows) < 2:
                 raise
             return rows, True
@@ -110,10 +110,14 @@ def _in_object(
         told = units if isinstance(units, list) and _is_text(units) else ()
         yield from _in_rows(rows, names, path, False, told)  # type: ignore[arg-type]
         return
-    if len(value) > 1 and all(key.isdecimal() for key in value) and _is_column([*value.values()]):
+    if _is_keyed(value):
         yield path, _stored([*value.values()], path.rpartition(".")[2], table)
         return
     units = value.get("units")
+    keyed = next((inner for inner in value.values() if _is_keyed(inner)), None)
+    if isinstance(keyed, Mapping) and not _counts(keyed):
+        inside = f"{path}.index" if path else "index"
+        yield inside, _stored([*keyed], "index", path)
     for key, inner in value.items():
         inside = f"{path}.{key}" if path else key
         unit = units.get(key) if isinstance(units, Mapping) else None
@@ -126,6 +130,19 @@ def _in_object(
                 yield name, _stored(_values(inner), key, path, unit)
             else:
                 yield name, column
+
+
+def _is_keyed(value: Json) -> bool:
+    """Return True for a column whose values have numbers, or dates and times, for keys."""
+    if not isinstance(value, Mapping) or len(value) < 2:
+        return False
+    keys = islice(value, LOOKED_AT)
+    return all(_column_of(key) is not None for key in keys) and _is_column([*value.values()])
+
+
+def _counts(value: Mapping[str, Json]) -> bool:
+    """Return True if the keys of a column number its values."""
+    return all(key == str(number) for number, key in enumerate(value))
 
 
 def _is_text(values: list[Json]) -> bool:

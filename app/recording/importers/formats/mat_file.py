@@ -39,6 +39,8 @@ OBJECTS = (
 #: Fields that say nothing by their names: the text in a field beside them names them.
 _GENERIC, _NAMES = frozenset({"data", "values", "value", "y", "signal"}), ("label", "name", "title")
 _UNITS = ("unit", "units")
+#: Signature of HDF5, and its place behind the block of text of a MAT file of version 7.3.
+_HDF5, _BEHIND = b"\x89HDF\r\n\x1a\n", 512
 
 
 class MatFile(StoredColumns):
@@ -131,7 +133,8 @@ def _load(path: Path) -> dict[str, Value]:
 
 
 def _sniff(head: bytes) -> bool:
-    return head.startswith(b"MATLAB 5.0 MAT-file")
+    # some programs write this text over a file of version 7.3, which is HDF5 behind it
+    return head.startswith(b"MATLAB 5.0 MAT-file") and not head.startswith(_HDF5, _BEHIND)
 
 
 IMPORTER = Importer("MATLAB MAT", (".mat",), MatFile, _sniff)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import struct
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -64,6 +65,7 @@ class TdmsChannels(StoredColumns):
         if not columns:
             raise InputError(f"{path} holds no channels of numbers")
         super().__init__(path, "a TDMS file", columns, cut_short=_is_cut_short(path))
+        self.doubts = _appended(path)
 
     def _stored(self, channel: TdmsChannel, first: np.datetime64 | None) -> Stored:
         told: Mapping[str, object] = channel.properties
@@ -138,6 +140,60 @@ def _segments(stream: BinaryIO, path: Path) -> Iterator[tuple[int, int]]:
         if size == NOT_ENDED:
             return
         at += LEAD_IN_BYTES + size
+
+
+def _appended(path: Path) -> list[str]:
+    """Return a sentence if a waveform begins again at another time, in a later session."""
+    starts: dict[bytes, float] = {}
+    found: list[str] = []
+    size = path.stat().st_size
+    with open_input(path) as stream:
+        for at, length in _segments(stream, path):
+            stream.seek(at)
+            lead_in = stream.read(LEAD_IN_BYTES)
+            if at + length > size or len(lead_in) < LEAD_IN_BYTES:
+                break
+            contents = LEAD_IN.unpack_from(lead_in)[1]
+            order = ">" if contents & BIG_ENDIAN else "<"
+            metadata = stream.read(min(SIZES[order].unpack_from(lead_in, LEAD_IN.size)[2], length))
+            for channel, start in _starts(metadata, order):
+                before = starts.get(channel)
+                starts[channel] = start
+                if before is not None and start != before and not found:
+                    name = printable(channel.decode("utf-8", "replace"))
+                    found.append(
+                        f"the file was continued: the waveform {name} begins {start - before:g} "
+                        f"s after its start again, and its rows follow here without a break; save "
+                        f"the sessions as files of their own"
+                    )
+    return found
+
+
+def _starts(metadata: bytes, order: str) -> Iterator[tuple[bytes, float]]:
+    """Yield the path of each channel in the ``metadata`` of a segment, and its start in s.
+
+    The property is looked for by its name: the data between have lengths that depend on their kind.
+    The last path of a channel before it, ``/'group'/'channel'``, is its own.
+    """
+    key = struct.pack(order + "I", len(_START)) + _START
+    at = metadata.find(key)
+    while at >= 0:
+        place = at + len(key)
+        kind, *parts = struct.unpack_from(order + "IQq", metadata.ljust(place + 20, b"\0"), place)
+        if order == ">":
+            parts.reverse()  # seconds first
+        paths = _CHANNEL.findall(metadata, 0, at)
+        if kind == _TIMESTAMP and paths:
+            yield paths[-1], parts[1] + parts[0] / 2.0**64
+        at = metadata.find(key, place)
+
+
+#: Name and type of the property with the start of a waveform, and the path of a channel.
+_START, _TIMESTAMP, _CHANNEL = (
+    b"wf_start_time",
+    0x44,
+    re.compile(rb"/'(?:[^']|'')*'/'(?:[^']|'')*'"),
+)
 
 
 def _sniff(head: bytes) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import math
+import re
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -21,7 +22,12 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
-from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
+from dearig.recording.importers.formats.cells import (
+    cell_of,
+    complaint_about,
+    number_in,
+    with_order,
+)
 from dearig.recording.importers.formats.columns import NamedColumns, Overview
 from dearig.recording.importers.formats.text_blocks import BytesReader, blocks_of, halves_of
 from dearig.recording.importers.formats.text_layout import (
@@ -35,7 +41,8 @@ from dearig.recording.importers.formats.text_layout import (
 )
 from dearig.recording.importers.formats.text_sections import Section, sections_of
 from dearig.recording.importers.importer import Importer
-from dearig.recording.importers.source import GapError, NeedsOptionError, no_such_column
+from dearig.recording.importers.quantities.text_numbers import GROUPED, signs_of
+from dearig.recording.importers.source import GapError, no_such_column, skip_or_refuse
 
 __all__ = ["IMPORTER", "TextFile"]
 
@@ -47,6 +54,14 @@ THREADS = 2
 ROOM = 1.05
 #: Bytes of an ASCII character in encodings where it has several.
 _WIDTHS = MappingProxyType({"utf-16": 2, "utf-32": 4})
+#: The first lines of a universal file: a separator, and the number of a kind of data.
+_UNIVERSAL = re.compile(r"\s*-1[ \t]*\r?\n[ \t]{0,5}(\d{1,4}b?)\s")
+#: Name of a file that QCoDeS exports, and what is known of it.
+_OF_QCODES = re.compile(r"qcodes_\d+_[0-9a-f]{8}-[0-9a-f-]{27}")
+_QCODES = (
+    "QCoDeS sorts the measured parameters by their names, and writes these only into its .nc "
+    "files: import that one"
+)
 _HEAD = 4 * HEAD_CHARACTERS  # bytes: a character has four at most
 
 
@@ -77,7 +92,14 @@ class TextFile(NamedColumns[Column]):
         head = head[:HEAD_CHARACTERS]
         if len(head) == HEAD_CHARACTERS:
             head = head.rpartition("\n")[0] or head
+        if match := _UNIVERSAL.match(head):
+            raise InputError(
+                f"{path} is a universal file (it begins with a dataset {match[1]}), which is not "
+                f"read: export the signals as text or MAT from the program that made it"
+            )
         self.layout: Layout = layout_of(head, encoding, path, names_line)
+        #: what is known of the program that wrote a table without names
+        self.hint = _QCODES if self.layout.names_line < 0 and _OF_QCODES.match(path.name) else ""
         columns = {column.name: column for column in self.layout.columns}
         self._section_of: dict[str, Section] = {}
         lines = head.replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -98,6 +120,11 @@ class TextFile(NamedColumns[Column]):
         self._is_spaced = f"{self.layout.delimiter} " in head
         self._side_by_side = any(column.group for column in self.layout.columns)
         self._wanted: list[Column] = []  # columns that were read last
+        #: places of columns of whole numbers in the sample, in which a block has a point or comma
+        self._pointed: set[int] = set()
+        self._decided: set[str] = set()  # columns whose signs the whole file has decided
+        self._said: list[str] = []
+        self._leaves_out, self._grouped = skip_bad_rows, False
         self._section = Section("", self.layout.first, None)  # and the table that they are of
         #: rows before each row that was left out, and its line, in words
         self.skipped: list[tuple[int, str]] = []
@@ -127,7 +154,7 @@ class TextFile(NamedColumns[Column]):
     @property
     def notes(self) -> Sequence[str]:
         """Sentences on what could be read in another way."""
-        return self.layout.notes
+        return (*self.layout.notes, *self._said)
 
     @property
     def block(self) -> Sequence[Sequence[str]]:
@@ -156,34 +183,82 @@ class TextFile(NamedColumns[Column]):
         return found
 
     def _read_section(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        wanted = [self._ordered(name) for name in dict.fromkeys(names)]
-        self.skipped, self._spans, self._wanted = [], [], wanted
+        while True:
+            wanted = [self._ordered(name) for name in dict.fromkeys(names)]
+            try:
+                table = self._read_rows(wanted, self._skip)
+            except _WrongCellError as wrong:
+                if wrong.grouped and self._decide(wrong.column):
+                    continue
+                if wrong.column in self.optional:
+                    raise GapError(wrong.place, wrong.column) from wrong
+                rows = self._read_rows(wanted, skip=True).rows
+                lost = len(self.skipped)
+                raise skip_or_refuse(f"{self.path}, {wrong.place}", lost, rows + lost) from wrong
+            pointed = [c.name for c in wanted if c.place in self._pointed]
+            if not sum(map(self._decide, pointed)):
+                break
+        return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
+
+    def _read_rows(self, wanted: list[Column], skip: bool) -> _Table:
+        """Return the rows of the columns ``wanted``; leave wrong ones out if ``skip``."""
+        self.skipped, self._spans, self._wanted, self._pointed = [], [], wanted, set()
+        self._leaves_out = skip
         table = _Table(len(wanted))
         size = left = self._size
         for line, block, values in self._parsed():
             self._keep(line, block, values, table, left)
             left -= len(block)
             self.progress(1.0 - max(left, 0) / size)
-        return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
+        return table
+
+    def _decide(self, name: str) -> bool:
+        """Find the signs in the numbers of a column from all its cells; return if they changed.
+
+        The sample may end before the first number that has a group of thousands.
+        """
+        column = self._columns[name]
+        if name in self._decided or column.since is not None:
+            return False
+        self._decided.add(name)
+        found = signs_of([list(dict.fromkeys(self._cells(column)))])[0]
+        if (found.decimal, found.thousands) == (column.decimal, column.thousands) or not (
+            found.is_sure
+        ):
+            return False
+        self._columns[name] = replace(
+            column, decimal=found.decimal, thousands=found.thousands, mixed=found.mixed,
+            undecided=False,
+        )  # fmt: skip
+        self._said.append(f"{found.thousands!r} in column {name!r} stands between thousands")
+        return True
 
     def _ordered(self, name: str) -> Column:
         """Return the column ``name``, with the order of day and month that the whole file says."""
         column = self._columns[name]
+        if column.mixed is not None:
+            one, other = column.mixed
+            raise InputError(
+                f"{self.path}: the cells {one!r} and {other!r} of column {name!r} cannot both be "
+                f"right: a sign stands before decimals in one and between thousands in the other; "
+                f"write the numbers without thousands separators"
+            )
         if column.is_open:
-            column = replace(with_order(column, self._cells(column.place)), is_open=False)
+            column = replace(with_order(column, self._cells(column)), is_open=False)
             self._columns[name] = column
         return column
 
-    def _cells(self, place: int) -> Iterator[str]:
-        """Yield the cells at ``place`` of all lines of the table."""
+    def _cells(self, column: Column) -> Iterator[str]:
+        """Yield the cells of ``column`` in all lines of the table."""
+        last = max(column.place, column.date_place or 0)
         for _, block in self._blocks():
             for line in block.decode("utf-8", "replace").split("\n"):
                 try:
                     cells = cells_of(line, self.layout.delimiter)
                 except csv.Error:
                     continue
-                if place < len(cells):
-                    yield cells[place]
+                if last < len(cells):
+                    yield cell_of(cells, column)
 
     def overview(self, names: Sequence[str], count: int) -> dict[str, Overview]:
         """Return the first ``count`` values of columns, how many there are, and their range.
@@ -293,17 +368,23 @@ class TextFile(NamedColumns[Column]):
         layout, wanted = self.layout, self._wanted
         if not self._is_plain or not wanted:
             return None
+        undecided = {c.place for c in wanted if c.undecided and c.name not in self._decided}
         try:
             table = pd.read_csv(
                 BytesReader(block), header=None, names=range(layout.cells), index_col=False,
                 sep=r"\s+" if layout.delimiter is None else layout.delimiter, comment="#",
                 decimal=wanted[0].decimal,
-                dtype=dict.fromkeys((c.place for c in wanted), np.float64),
+                dtype=dict.fromkeys({c.place for c in wanted} - undecided, np.float64),
                 skipinitialspace=self._is_spaced, na_filter=False, engine="c", low_memory=False,
             )  # fmt: skip
         except (ValueError, OverflowError):  # a parser's error is a ValueError
             return None
-        values = [table[column.place].to_numpy() for column in wanted]
+        if undecided:
+            kinds = {place: table[place].dtype.kind for place in undecided}
+            if not set(kinds.values()) <= set("iuf"):
+                return None
+            self._pointed |= {place for place, kind in kinds.items() if kind == "f"}
+        values = [table[c.place].to_numpy().astype(np.float64, copy=False) for c in wanted]
         # a row that is too short has no last cell
         last = table[layout.cells - 1]
         whole = last.dtype.kind == "f" or bool((last.astype(str) != "").all())
@@ -314,11 +395,13 @@ class TextFile(NamedColumns[Column]):
         import pandas as pd
 
         layout = self.layout
+        places = {c.place for c in self._wanted}
+        places |= {c.date_place for c in self._wanted if c.date_place is not None}
         try:
             table = pd.read_csv(
                 BytesReader(block), header=None, names=range(layout.cells), index_col=False,
                 sep=r"\s+" if layout.delimiter is None else layout.delimiter, comment="#",
-                usecols=sorted({c.place for c in self._wanted}), dtype=str, na_filter=False,
+usecols=sorted(places), dtype=str, na_filter=False,
                 skipinitialspace=self._is_spaced, on_bad_lines="skip", engine="c",
                 low_memory=False,
             )  # fmt: skip
@@ -327,6 +410,8 @@ class TextFile(NamedColumns[Column]):
         found = []
         for column in self._wanted:
             cells = table[column.place].astype(str)
+            if column.date_place is not None:
+                cells = table[column.date_place].astype(str) + " " + cells
             if self._is_plain and column.decimal == ".":
                 numbers = pd.to_numeric(cells, errors="coerce").to_numpy(np.float64)
             else:
@@ -347,15 +432,10 @@ class TextFile(NamedColumns[Column]):
             fault, values, column = self._row(content, self._wanted)
             if not fault:
                 rows.append(values)
-            elif column in self.optional:
-                raise GapError(f"line {number}{fault}", column)
-            elif self._skip:
+            elif self._leaves_out and column not in self.optional:
                 self.skipped.append((before + len(rows), f"line {number}"))
             else:
-                raise NeedsOptionError(
-                    f"{self.path}, line {number}{fault}; --skip-bad-rows leaves such rows out",
-                    "--skip-bad-rows",
-                )
+                raise _WrongCellError(f"line {number}{fault}", column, self._grouped)
         return list(np.array(rows, dtype=np.float64).reshape(len(rows), len(self._wanted)).T)
 
     def _holds_data(self, content: str) -> bool:
@@ -381,13 +461,28 @@ class TextFile(NamedColumns[Column]):
             said = f": {len(cells)} values, and the table has {self.layout.cells} columns"
             return said, [], ""
         values = []
+        self._grouped = False
         for column in wanted:
-            value = number_in(cells[column.place], column)
+            cell = cell_of(cells, column)
+            value = number_in(cell, column)
             if value is None or not math.isfinite(value):
-                wrong = complaint_about(cells[column.place], value)
+                wrong = complaint_about(cell, value)
+                self._grouped = GROUPED.fullmatch(cell) is not None
                 return f", column {column.name!r}: {wrong}", [], column.name
             values.append(value)
         return "", values, ""
+
+
+class _WrongCellError(Exception):
+    """A cell is no number, or a line is no row, at a ``place`` in words.
+
+    ``column`` is its name, "" where the whole line is wrong; ``grouped`` if digits of the cell
+    stand in groups.
+    """
+
+    def __init__(self, place: str, column: str, grouped: bool) -> None:
+        super().__init__(place)
+        self.place, self.column, self.grouped = place, column, grouped
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,20 @@ import functools
 import itertools
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
 from dearig.errors import InputError
-from dearig.recording.importers.quantities.labels import has_east_asian_name
-from dearig.recording.importers.quantities.moments import day_first_or_open, is_open_date, moment_of
+from dearig.recording.importers.quantities.labels import has_east_asian_name, label_of
+from dearig.recording.importers.quantities.moments import (
+    MIDNIGHT,
+    day_first_or_open,
+    is_date,
+    is_open_date,
+    moment_of,
+)
 from dearig.recording.importers.quantities.text_numbers import Signs, is_number, signs_of
 from dearig.recording.importers.quantities.units import unit_of
 
@@ -50,6 +56,11 @@ _EAST_ASIAN = ("gb18030", "cp932")  # taken where they give a name that is known
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: any white space
 _RULE = re.compile(r"[\s|+:=_*-]+")  # a line that is drawn below the names
 _SAMPLE = 400  # lines of data that are looked at
+#: Lines above a table in which names are looked for, and names of quantities in a line of names
+#: that names fewer columns than there are, at least.
+HEADER_LINES, NAMED_MIN = 8, 2
+#: What a Campbell logger writes as the units of time stamps and of numbers of rows.
+_NO_UNITS = frozenset({"TS", "RN"})
 _LEAST = 2  # lines of data in a row that begin a table
 
 
@@ -60,8 +71,11 @@ class Column:
     ``own`` is its name without ``group``, the specimen or table that it belongs to where there are
     several side by side, and without the place behind a repeated name. ``decimal`` is the sign
     before decimals, ``thousands`` that between groups of digits, or empty. ``since`` is the first
-    moment of a column of dates and times of day, which is read in s from it. ``day_first`` is the
-    order in its dates, which ``is_open`` where their form does not say it: then all of them do.
+    moment of a column of dates and times of day, which is read in s from it; ``date_place`` is the
+    place of the dates that belong to times of day. ``day_first`` is the order in its dates, which
+    ``is_open`` where their form does not say it: then all of them do. ``undecided``: the sample
+    does not say what a point or a comma in its numbers means. ``mixed`` are two cells in which it
+    has two meanings.
     """
 
     name: str
@@ -74,6 +88,9 @@ class Column:
     own: str = ""
     day_first: bool = True
     is_open: bool = False
+    date_place: int | None = None
+    undecided: bool = False
+    mixed: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -245,6 +262,8 @@ class _Table:
         if self.cells > COLUMNS_MAX:
             raise _too_wide(path, self.cells)
         line, names, units = self._names(path, names_line)
+        self._check_commas(path, line, names)
+        names = self._behind_row_names(names)
         if self.labview:
             units = units or self._labview_units()
         groups = self._groups(line, names)
@@ -259,6 +278,20 @@ class _Table:
             encoding, self.delimiter, self.first, line, self.cells, _unique(columns), block,
             self._step(names, units, block), (*notes, *self._passed_over(line)),
         )  # fmt: skip
+
+    def _behind_row_names(self, names: list[str]) -> list[str]:
+        """Return ``names``, moved by one where the first column has the names of rows, as R writes.
+
+        There is a name less than columns, and the first one counts the rows.
+        """
+        if not names or len(names) != self.cells - 1:
+            return names
+        first = [row[0] for row in self.sample]
+        counts = first == [str(i) for i in range(1, len(first) + 1)]
+        # names of rows are texts, and in quotation marks; a time that counts is not
+        quoted = re.match(r'"\d+"[^"]', self.lines[self.first].strip()) is not None
+        is_time = "time" in label_of(names[0]).quantities
+        return ["", *names] if counts and (quoted or not is_time) else names
 
     def _names(self, path: Path, given: int | None) -> tuple[int, list[str], list[str]]:
         """Return the line of the names, the names, and the units below them."""
@@ -281,13 +314,65 @@ class _Table:
         cells = self._split(above[0])
         if len(above) > 1 and _are_units(cells):
             names = self._split(above[1])
+            if not any(map(_says, names)) and (better := self._named_above(above[:HEADER_LINES])):
+                return better
             if self._are_names(names) or (len(names) == len(cells) and _are_all_units(cells)):
                 return above[1], names, cells
+        said = sum(map(_says, cells)) if self._are_names(cells) else 0
+        better = self._named_above(above[:HEADER_LINES]) if said < len(cells) else None
+        if better is not None and sum(map(_says, better[1])) > said:
+            return better
         if not self._are_names(cells):
             return -1, [], []
         units = self._split(above[1]) if len(above) > 1 else []
         # some programs write the units above the names
         return above[0], cells, units if len(units) == len(cells) and _are_all_units(units) else []
+
+    def _named_above(self, above: Sequence[int]) -> tuple[int, list[str], list[str]] | None:
+        """Return the line of ``above`` that names the most quantities, its names, and units.
+
+        Loggers write further lines: kinds of values, sensors, numbers of channels. What the line
+        leaves empty, another one names. None if no line names a quantity.
+        """
+        lines = {
+            i: cells for i in above
+            if len(cells := self._split(i)) >= self._used
+            and (self.delimiter is not None or len(cells) == self.cells)
+        }  # fmt: skip
+        said = {
+            i: 0 if _are_all_units(cells) else sum(map(_says, cells)) for i, cells in lines.items()
+        }
+        best = max(lines, key=lambda i: (said[i], i), default=-1)
+        if best < 0 or not said[best]:
+            return None
+        names = list(lines[best])
+        units: list[str] = []
+        for number, cells in lines.items():
+            if number != best and not units and (_are_units(cells) or _are_all_units(cells)):
+                units = cells
+        for place, name in enumerate(names):
+            others = (
+                cells[place] for i, cells in lines.items()
+                if not name and i != best and cells is not units and place < len(cells)
+            )  # fmt: skip
+            names[place] = name or next((c for c in others if c and not is_number(c)), "")
+        return best, names, units
+
+    @property
+    def _used(self) -> int:
+        """Number of cells of a row up to the last one that any row has."""
+        return max(i for row in self.sample for i, cell in enumerate(row) if cell) + 1
+
+    def _check_commas(self, path: Path, line: int, names: Sequence[str]) -> None:
+        """Raise ``InputError`` if the comma stands both between columns and before decimals."""
+        named = len([name for name in names if name])
+        whole = all(re.fullmatch(r"[+-]?\d*", cell) for row in self.sample for cell in row)
+        if self.delimiter == "," and 1 < named < self.cells <= 2 * named and whole:
+            raise InputError(
+                f"{path}: line {line + 1} has {named} names, and the rows below it have "
+                f"{self.cells} numbers: the comma stands between columns and before decimals; "
+                f"export it again with another sign between columns, such as a semicolon"
+            )
 
     def _labview_units(self) -> list[str]:
         """Return the units that the head of a LabVIEW file gives, by the place of the column."""
@@ -312,10 +397,13 @@ class _Table:
     def _are_names(self, cells: list[str]) -> bool:
         if self.delimiter is None and len(cells) != self.cells:
             return False  # which is above which column cannot be told
-        used = max(i for row in self.sample for i, cell in enumerate(row) if cell) + 1
         named = [cell for cell in cells if cell]
         numbers = sum(is_number(cell) for cell in named)
-        return len(cells) >= used and len(named) > 0 and numbers == 0
+        # a column at the end may have no name: a counter, or a note beside the table
+        whole = len(cells) >= self._used or (
+            sum(map(_says, cells)) >= NAMED_MIN and not _are_all_units(cells)
+        )
+        return whole and len(named) > 0 and numbers == 0
 
     def _groups(self, line: int, names: list[str]) -> list[str]:
         """Return the specimen or table of each column; empty where there is only one.
@@ -360,7 +448,8 @@ class _Table:
         moments = {p: next(filter(None, map(moment_of, column)), None) for p, column in
                    cells.items()}  # fmt: skip
         timed = {place: moment for place, moment in moments.items() if moment is not None}
-        numbers = {place: column for place, column in cells.items() if place not in timed}
+        dated = self._dates(cells, timed)
+        numbers = {p: c for p, c in cells.items() if p not in timed and p not in dated.values()}
         signs = dict(zip(numbers, signs_of([*numbers.values()]), strict=True))
         found: list[Column] = []
         notes: list[str] = []
@@ -368,6 +457,11 @@ class _Table:
             name = names[place] if place < len(names) and names[place] else f"#{place + 1}"
             unit = units[place] if place < len(units) else ""
             group, of = groups[place], signs.get(place, Signs())
+            if place in dated.values():
+                continue
+            if place in timed and place in dated:
+                days = [row[dated[place]].removesuffix(" 00:00:00") for row in self.sample]
+                column = [f"{day} {row[place]}" for day, row in zip(days, self.sample, strict=True)]
             if place in timed:
                 first = day_first_or_open(column)
                 since = next(filter(None, (moment_of(cell, first) for cell in column)), None)
@@ -375,6 +469,7 @@ class _Table:
                     Column(
                         name, place, "s", since=since or timed[place], group=group,
                         day_first=first, is_open=any(map(is_open_date, column)),
+                        date_place=dated.get(place),
                     )
                 )  # fmt: skip
                 continue
@@ -384,8 +479,24 @@ class _Table:
                     f"{cell!r} in column {name!r} is read as {cell.replace(',', '.')}: nothing in "
                     f"the file says whether the comma is of decimals"
                 )
-            found.append(Column(name, place, unit, of.decimal, of.thousands, group=group))
+            found.append(
+                Column(
+                    name, place, unit, of.decimal, of.thousands, group=group,
+                    undecided=not of.is_sure, mixed=of.mixed,
+                )
+            )  # fmt: skip
         return found, notes
+
+    def _dates(
+        self, cells: Mapping[int, list[str]], timed: Mapping[int, datetime]
+    ) -> dict[int, int]:
+        """Return the place of the dates by that of their times of day, where both stand apart."""
+        clocks = [place for place, moment in timed.items() if moment.date() == MIDNIGHT.date()]
+        days = [
+            place for place, column in cells.items()
+            if all(is_date(cell) or cell.endswith(" 00:00:00") for cell in column)
+        ]  # fmt: skip
+        return {clocks[0]: days[0]} if len(clocks) == len(days) == 1 else {}
 
     def _passed_over(self, line: int) -> list[str]:
         """Return a note on rows of numbers between the names and the first row that is read."""
@@ -438,9 +549,15 @@ def _bare(line: str) -> str:
     return line.strip().lstrip("#%/;").strip() if line.strip().startswith(_COMMENTS) else line
 
 
+def _says(cell: str) -> bool:
+    """Return True if ``cell`` names a quantity."""
+    label = label_of(cell)
+    return bool(label.quantities or label.raw or label.asked)
+
+
 def _are_units(cells: Sequence[str]) -> bool:
     """Return True if ``cells`` are a line of units; an oscilloscope has numbers beside them."""
-    named = [c for c in cells if c and not is_number(c)]
+    named = [c for c in cells if c and not is_number(c) and c not in _NO_UNITS]
     known = [c for c in named if unit_of(c) is not None]
     return len(known) > 0 and len(known) >= len(named) - 1
 
@@ -476,6 +593,6 @@ def is_row(line: str, layout: Layout) -> bool:
 
 def _is_data(cells: Sequence[str], strict: bool) -> bool:
     """Return True if ``cells`` are a row of numbers; if not ``strict``, mostly numbers."""
-    numbers = sum(is_number(cell) or moment_of(cell) is not None for cell in cells)
+    numbers = sum(is_number(c) or moment_of(c) is not None or is_date(c) for c in cells)
     words = sum(bool(cell) for cell in cells) - numbers
     return numbers > words if not strict else numbers > 0 and words == 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["by_sixties", "epoch_unit"]
+__all__ = ["by_sixties", "counts_days", "epoch_unit"]
 
 #: Spread of the steps counted by sixties, over that of the numbers: chance gives no such part.
 _EVENER = 0.25
@@ -39,3 +39,19 @@ def epoch_unit(values: np.ndarray) -> str:
         return ""
     low, high = _EPOCH
     return next((unit for unit, times in _UNITS if low * times < values[0] < high * times), "")
+
+
+#: Days since 1900 of the years 2000 to 2100, as spreadsheets count them.
+_DAYS = (36_526.0, 73_050.0)
+#: Longest step in days between samples of which it is sure: 10 s. A clock of seconds that has run
+#: for ten hours and more, and is read every 0.1 ms, is none of a laboratory.
+_DAYS_STEP = 10.0 / 86_400.0
+
+
+def counts_days(values: np.ndarray) -> bool:
+    """Return True if ``values`` (n,) count days since 1900, by their size and their steps."""
+    if values.size < _ROWS_MIN or not np.isfinite(values).all():
+        return False
+    if not _DAYS[0] < float(values.min()) <= float(values.max()) < _DAYS[1]:
+        return False
+    return 0.0 < float(np.median(np.diff(values))) <= _DAYS_STEP

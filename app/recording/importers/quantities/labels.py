@@ -14,6 +14,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from dearig.errors import InputError
+from dearig.recording.importers.quantities.qualifiers import (
+    COMPRESSIVE,
+    TRUE,
+    is_harmful,
+    qualifier_in,
+)
 from dearig.recording.importers.quantities.units import UNITS, WIDE_BRACKETS, Scale, unit_of
 
 __all__ = [
@@ -39,7 +45,9 @@ DIMENSIONS = MappingProxyType(
         "temperature": "temperature",
         "stretch": "stretch",
         "strain": "strain",
+        "true_strain": "strain",
         "nominal_stress": "stress",
+        "true_stress": "stress",
         "force": "force",
     }
 )
@@ -55,7 +63,7 @@ def _plain(text: str) -> str:
 #: together, such as Standardkraft, counts by its end.
 _WORDS = MappingProxyType(
     {
-        "time": "time zeit temps timestamp zeitstempel datetime elapsed t",
+        "time": "time zeit temps timestamp timestamps zeitstempel datetime elapsed t",
         "voltage_monitor": "monitor moniteur vmon",
         "voltage": "voltage volt volts spannung tension hv highvoltage hochspannung u v potential "
         "potentiel",
@@ -98,14 +106,17 @@ _EAST_ASIAN_ENDS = tuple(
 #: Ends of a pressure, which is no force.
 _EAST_ASIAN_OTHERS = ("压力", "圧力", "壓力")
 
-#: Words of a quantity of another kind: true stress is no nominal stress, a speed is no travel.
+#: Words of a quantity of another kind: a speed is no travel.
 _OTHERS = frozenset(
     re.findall(
         r"\w+",
-        """true wahre vraie cauchy rate speed velocity geschwindigkeit vitesse target setpoint
-        sollwert set limit error std model power energy energie nr no number cycle zyklus cycles""",
+        """rate speed velocity geschwindigkeit vitesse limit power energie energy work arbeit nr no
+        number cycle zyklus cycles thickness dicke width breite area flache diameter durchmesser
+        gap""",
     )
 )
+#: Quantities that refer to the film as it is strained, by those that refer to it at rest.
+_TRUE_OF = MappingProxyType({"strain": "true_strain", "nominal_stress": "true_stress"})
 
 
 @dataclass(frozen=True)
@@ -115,6 +126,10 @@ class Label:
     ``unit`` is a symbol of ``UNITS``, ``dimensions`` are those that the symbol belongs to. ``raw``
     is the quantity of an instrument's output in volts, such as a laser's. ``unknown`` is what
     seems to be a unit and is none of ``UNITS``.
+
+    ``asked`` are quantities that the column may be although its word ``qualifier`` leaves it open:
+    "desired displacement". ``conflict`` is a unit that the file gives beside the name and that is
+    another one than the name's. ``compressive``: its positive values mean compression.
     """
 
     name: str
@@ -123,6 +138,10 @@ class Label:
     dimensions: tuple[str, ...] = ()
     raw: str = ""
     unknown: str = ""
+    asked: tuple[str, ...] = ()
+    qualifier: str = ""
+    conflict: str = ""
+    compressive: bool = False
 
 
 @dataclass(frozen=True)
@@ -198,19 +217,29 @@ def label_of(name: str, unit: str = "") -> Label:
     for pattern in () if inside else _UNIT_IN_NAME:
         match = pattern.fullmatch(bracketed)
         if match and "[" not in match["name"] and (known := unit_of(match["unit"])):
+            if match["unit"] == "1" and _read(match["name"]).quantities[:1] != ["strain"]:
+                continue  # a number
             words, found = match["name"], known
             break
     symbol, dimensions = found or ("", ())
+    beside = unit_of(unit) if unit else None
+    conflict = beside[0] if beside and found and beside[0] != symbol else ""
     unknown = "" if found else unit or _unknown_unit(name)
-    quantities = _quantities(words)
-    raw = ""
+    said = _read(words)
+    quantities, raw = said.quantities, ""
     if found:
         # the output of a laser or of a monitor in volts is no voltage at the film
         raw = next((q for q in quantities if dimensions == ("voltage",) and q in _RAW), "")
         if raw and raw != "voltage_monitor":
             quantities = []
         quantities = [q for q in quantities if DIMENSIONS[q] in dimensions]
-    return Label(name, tuple(quantities), symbol, dimensions, raw, unknown)
+    asked = tuple(q for q in said.asked if not found or DIMENSIONS[q] in dimensions)
+    if asked:  # the word counts for the column, whichever of its words is the quantity
+        quantities, raw = [], ""
+    return Label(
+        name, tuple(quantities), symbol, dimensions, raw, unknown, asked, said.qualifier, conflict,
+        said.compressive,
+    )  # fmt: skip
 
 
 def _unknown_unit(name: str) -> str:
@@ -233,22 +262,61 @@ _UNIT_IN_NAME = (
 )
 
 
-def _quantities(name: str) -> list[str]:
-    """Return the quantities that the words of ``name`` stand for."""
-    words = re.findall(r"[^\W\d_]+", _plain(name))
-    if _OTHERS.intersection(words):
-        return []
+@dataclass(frozen=True)
+class _Said:
+    """What the words of a name say: quantities, those that it leaves open, and by which word."""
+
+    quantities: list[str]
+    asked: list[str]
+    qualifier: str
+    compressive: bool
+
+
+def _words_of(name: str) -> list[str]:
+    """Return the words of ``name`` without accents, in small letters.
+
+    StandardForce is two words; so is Standardkraft, whose end names the quantity.
+    """
     found: list[str] = []
-    for word in words:
-        known = _QUANTITIES_OF.get(word)
-        if known is None:
-            end = next((e for e in _ENDS if word.endswith(e)), "")
-            known = _QUANTITIES_OF.get(end) or _east_asian(word)
-        if len(word) > 1 or len(words) == 1:  # a letter among words is an index
-            found += [q for q in known if q not in found]
-    if "voltage_monitor" in found:  # of the voltage, unless its name says of what
-        found = [q for q in found if q in ("current", "displacement")] or ["voltage_monitor"]
+    for word in re.findall(r"[^\W\d_]+", _plain(_CAMEL.sub(" ", name))):
+        end = "" if word in _QUANTITIES_OF else next((e for e in _ENDS if word.endswith(e)), "")
+        found += [word[: -len(end)], end] if end and word != end else [word]
     return found
+
+
+#: The place between two words that are written together, each with a capital letter.
+_CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z][a-z]{2})")
+
+
+def _read(name: str) -> _Said:
+    """Return what the words of ``name`` say."""
+    words = _words_of(name)
+    qualifier = next(filter(is_harmful, words), "")
+    if _OTHERS.intersection(words):
+        return _Said([], [], qualifier, False)
+    places: dict[int, list[str]] = {}
+    for place, word in enumerate(words):
+        known = _QUANTITIES_OF.get(word) or _east_asian(word)
+        if known and (len(word) > 1 or len(words) == 1):  # a letter among words is an index
+            places[place] = known
+    sure: list[str] = []
+    asked: list[str] = []
+    for place, known in places.items():
+        others = [w if at == place or at not in places else "" for at, w in enumerate(words)]
+        open_by = {q: qualifier_in(q, others, place) for q in known}
+        if is_harmful(words[place]):  # of a Chinese or Japanese name, which has no blanks
+            open_by = dict.fromkeys(known, words[place])
+        free = [q for q, word in open_by.items() if not word]
+        sure += free
+        if not free:
+            asked += known
+            qualifier = qualifier or next(iter(open_by.values()))
+    if TRUE.intersection(words):
+        sure = [_TRUE_OF[q] for q in sure if q in _TRUE_OF]
+    sure, asked = list(dict.fromkeys(sure)), list(dict.fromkeys(asked))
+    if "voltage_monitor" in sure:  # of the voltage, unless its name says of what
+        sure = [q for q in sure if q in ("current", "displacement")] or ["voltage_monitor"]
+    return _Said(sure, asked, qualifier, bool(COMPRESSIVE.intersection(words)))
 
 
 def _east_asian(word: str) -> list[str]:

@@ -8,13 +8,27 @@ from collections.abc import Iterable
 from datetime import date, datetime, timedelta
 
 from dearig.errors import InputError
+from dearig.recording.importers.quantities.text_numbers import is_number
 
-__all__ = ["OpenDatesError", "day_first_of", "day_first_or_open", "is_open_date", "moment_of"]
+__all__ = [
+    "MIDNIGHT",
+    "OpenDatesError",
+    "day_first_of",
+    "day_first_or_open",
+    "is_date",
+    "is_open_date",
+    "moment_of",
+]
 
 #: A time of day, or a time since the start, which may have many hours or none.
 _CLOCK = re.compile(r"(?:(\d{1,5}):)?([0-5]?\d):([0-5]\d(?:\.\d+)?)")
 _HALF_DAY = re.compile(r"(\d{1,2}):(\d{2}):(\d{2})(?:\.(\d+))? ?([AaPp])\.?[Mm]\.?")
-_MIDNIGHT = datetime(1900, 1, 1)  # of times without a date, as strptime has it
+#: Days and a time of day as pandas writes a duration; a negative one has negative days.
+_DURATION = re.compile(
+    r"(?P<days>-?\d{1,6}) days?,? [+]?(?P<hour>\d{1,2}):(?P<minute>\d{2}):"
+    r"(?P<second>\d{2}(?:\.\d+)?)"
+)
+MIDNIGHT = datetime(1900, 1, 1)  # of times without a date, as strptime has it
 #: Three parts of a date, then a time of day; the last part of the second may follow a colon.
 _DATED = re.compile(
     r"(?P<a>\d{1,4}|[^\W\d_]{3,9})\.?(?P<sign>[/.\- ]) ?(?P<b>\d{1,2}|[^\W\d_]{3,9})\.?,?"
@@ -43,23 +57,28 @@ def moment_of(cell: str, day_first: bool | None = None) -> datetime | None:
     ``day_first`` is the order in a date such as 03/04/2024. Without it the date is any that is
     possible, with the day first, but the month where the time has AM or PM.
     """
-    if ":" not in cell or not cell[:1].isalnum():
+    if ":" not in cell or not (cell[:1].isalnum() or cell[:1] == "-"):
         return None
     text = cell.replace(",", ".")
     if match := _CLOCK.fullmatch(text):
         hours, minutes, seconds = match.groups()
         if hours is None and "." not in seconds:
             return None  # it may be hours and minutes
-        return _MIDNIGHT + timedelta(
+        return MIDNIGHT + timedelta(
             hours=int(hours or 0), minutes=int(minutes), seconds=float(seconds)
         )
     try:
         return datetime.fromisoformat(text)
     except ValueError:
         pass
+    if match := _DURATION.fullmatch(text):
+        return MIDNIGHT + timedelta(
+            days=int(match["days"]), hours=int(match["hour"]), minutes=int(match["minute"]),
+            seconds=float(match["second"]),
+        )  # fmt: skip
     if match := _HALF_DAY.fullmatch(text):
         hour, minute, second, part, half = match.groups()
-        return _at(_MIDNIGHT.date(), hour, minute, second, part, half)
+        return _at(MIDNIGHT.date(), hour, minute, second, part, half)
     if (match := _DATED.fullmatch(cell) or _DATED.fullmatch(text)) is None:
         return None
     orders = (day_first,) if day_first is not None else (match["half"] is None, bool(match["half"]))
@@ -68,6 +87,16 @@ def moment_of(cell: str, day_first: bool | None = None) -> datetime | None:
         if day is not None:
             return _at(day, *match.group("hour", "minute", "second", "part", "half"))
     return None
+
+
+def is_date(cell: str) -> bool:
+    """Return True if ``cell`` is a date without a time of day."""
+    if ":" in cell or is_number(cell) or not cell[:1].isalnum():
+        return False
+    return moment_of(f"{cell} {_NOON}") is not None
+
+
+_NOON = "12:00:00"
 
 
 def is_open_date(cell: str) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 __all__ = ["GROUPED", "MINUS", "Signs", "is_number", "signs_of"]
 
@@ -25,12 +25,15 @@ GROUPED = re.compile(
 class Signs:
     """Signs in the numbers of a column: before decimals, and between groups of digits or "".
 
-    ``open`` is True where nothing in the file tells whether the sign is of decimals.
+    ``open`` is True where nothing in the file tells whether the sign is of decimals. It ``is_sure``
+    where a cell decides it. ``mixed`` are two cells in which a sign has both meanings.
     """
 
     decimal: str = "."
     thousands: str = ""
     open: bool = False
+    is_sure: bool = field(default=False, compare=False)
+    mixed: tuple[str, str] | None = None
 
 
 def is_number(cell: str) -> bool:
@@ -52,10 +55,10 @@ def signs_of(columns: Sequence[Sequence[str]]) -> list[Signs]:
 def _settled(one: Signs, sure: bool, common: str) -> Signs:
     """Return the signs of a column, with the decimal sign ``common`` to the others, or ""."""
     if sure or not common:
-        return one
+        return replace(one, is_sure=sure)
     if not one.open or one.decimal == common:
-        return Signs(common, one.thousands)
-    return Signs(common, one.decimal)  # what seemed to be decimals is a group
+        return Signs(common, one.thousands, is_sure=True)
+    return Signs(common, one.decimal, is_sure=True)  # what seemed to be decimals is a group
 
 
 def _in_column(cells: Sequence[str]) -> tuple[Signs, bool]:
@@ -65,19 +68,46 @@ def _in_column(cells: Sequence[str]) -> tuple[Signs, bool]:
     both = next((cell for cell in grouped if "," in cell and "." in cell), None)
     if both is not None:
         decimal = max(",.", key=both.rfind)
-        return Signs(decimal, "." if decimal == "," else ","), True
+        between = "." if decimal == "," else ","
+        alone = (cell for cell in cells if between in cell and decimal not in cell)
+        odd = next((cell for cell in alone if not _is_group(cell, between, grouped)), None)
+        return Signs(decimal, between, mixed=None if odd is None else (odd, both)), True
     opened = ""
     for sign in ",.":
         there = [cell for cell in cells if sign in cell]
-        if any(cell.count(sign) > 1 for cell in there):
-            return Signs("." if sign == "," else ",", sign), True
-        if any(not _is_group(cell, sign, grouped) for cell in there):
+        other = "." if sign == "," else ","
+        several = next((cell for cell in there if cell.count(sign) > 1), None)
+        decimals = next((cell for cell in there if not _is_group(cell, sign, grouped)), None)
+        if several is not None:
+            mixed = None if decimals is None else (decimals, several)
+            return Signs(other, sign, mixed=mixed), True
+        if decimals is not None:
             return Signs(sign, thousands), True
+        if _are_thousands(cells, there, sign):
+            return Signs(other, sign), True
         opened = opened or (sign if there else "")
     return Signs(opened or ".", thousands, open=bool(opened)), False
+
+
+def _are_thousands(cells: Sequence[str], grouped: Sequence[str], sign: str) -> bool:
+    """Return True if ``sign`` stands between thousands: 998 has none and 1.002 has it.
+
+    Decimals would end in a zero one time in ten, and then have fewer digits.
+    """
+    if len(set(grouped)) < _GROUPS_MIN:
+        return False
+    plain = [cell.lstrip(f"+-{MINUS}") for cell in cells if sign not in cell]
+    return bool(plain) and all(cell.isdigit() and len(cell) <= _GROUP for cell in plain)
+
+
+#: Digits of a group, and numbers with a group from which it is sure that they are no decimals:
+#: of so many with three decimals all would end in another digit than 0 one time in ten.
+_GROUP, _GROUPS_MIN = 3, 22
 
 
 def _is_group(cell: str, sign: str, grouped: dict[str, re.Match[str]]) -> bool:
     """Return True if the digits behind ``sign`` may be a group of thousands."""
     match = grouped.get(cell)
-    return match is not None and match[1] == sign and not cell.lstrip(f"+-{MINUS}").startswith("0")
+    if match is None or match[1] != sign:
+        return False
+    return not cell.lstrip(f"+-{MINUS}").startswith("0")

@@ -1,0 +1,101 @@
+"""Time stamps that do not go forward evenly: midnight, summer time, too coarse a clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from dearig.recording.content.timestamps import not_forward
+from dearig.recording.importers.source import LOST_MAX, NeedsOptionError, skip_or_refuse
+
+__all__ = ["check_forward", "one_clock"]
+
+#: s: a day, the least fall of a time of day that is the next day, the step of summer time.
+_DAY, _NEXT_DAY, _SUMMER = 86_400.0, 43_200.0, 3600.0
+
+
+def one_clock(
+    time: np.ndarray, place: Callable[[int], str]
+) -> tuple[np.ndarray, list[str], list[str]]:
+    """Return the times (n,) of a clock in s as one that goes forward, notes, and doubts.
+
+    ``place`` says where a row is in the file. A time of day that falls by more than half a day is
+    of the next day. A clock that falls by an hour was set back at the end of summer time; one that
+    jumps by an hour may have been set forward, which is said only.
+    """
+    notes: list[str] = []
+    doubts: list[str] = []
+    steps = np.diff(time)
+    forward = steps[steps > 0.0]
+    if not forward.size or not np.isfinite(steps).all():
+        return time, notes, doubts
+    usual = float(np.median(forward))
+    added = np.zeros(time.size)
+    for at in np.flatnonzero(steps < 0.0).tolist():
+        if -_DAY <= steps[at] < -_NEXT_DAY:
+            added[at + 1 :] += _DAY
+            notes.append(f"after {place(at)} the time of day begins again: the next day")
+        elif abs(steps[at] + _SUMMER - usual) <= max(usual, 1.0):
+            added[at + 1 :] += _SUMMER
+            doubts.append(
+                f"the time goes back by {-steps[at]:g} s after {place(at)}: did summer time end? "
+                f"An hour was added to what follows"
+            )
+    ahead = np.abs(steps - _SUMMER - usual) <= 0.5 * usual
+    if usual < _SUMMER / 2.0:
+        doubts += [
+            f"the time jumps by {steps[at]:g} s after {place(at)}, and goes on in steps of "
+            f"{usual:g} s: did summer time begin?"
+            for at in np.flatnonzero(ahead).tolist()[:1]
+        ]
+    return (time + added if notes or added.any() else time), notes, doubts
+
+
+def check_forward(time: np.ndarray, column: str, place: Callable[[int], str], path: object) -> None:
+    """Raise ``InputError`` unless ``time`` (n,) increases; with an option if one is right."""
+    if (back := not_forward(time)) is None:
+        return
+    at, how = back
+    said = f"{path}, {place(at)}, column {column!r}: time {how}, from {time[at - 1]:.9g} to "
+    said += f"{time[at]:.9g}"
+    if (shared := _shared(time)) is not None:
+        rows, rate = shared
+        raise NeedsOptionError(
+            f"{said}: {rows:.3g} rows share each time stamp, so its clock is coarser than the "
+            f"rows, or its digits are rounded; the rows are even, and --rate-Hz gives them their "
+            f"time",
+            "--rate-Hz",
+            rate,
+        )
+    latest = np.maximum.accumulate(time)
+    lost = int((time[1:] <= latest[:-1]).sum())
+    more = ", and --rate-Hz replaces the time of evenly spaced samples"
+    raise skip_or_refuse(said, lost, time.size, more)
+
+
+def _shared(time: np.ndarray) -> tuple[float, str] | None:
+    """Return how many rows share a stamp and the rate of even rows in Hz; None if they are not."""
+    steps = np.diff(time)
+    first = np.flatnonzero(steps > 0.0) + 1  # rows that begin a stamp
+    if (steps < 0.0).any() or first.size < 2 or first.size > (1.0 - LOST_MAX) * time.size:
+        return None
+    stamp = float(np.median(np.diff(time[first])))
+    rows = np.arange(time.size) - (time.size - 1) / 2.0
+    period = float(rows @ time) / float(rows @ rows)
+    apart = time - period * rows
+    if float(apart.max() - apart.min()) > stamp + 2.0 * period:
+        return None
+    # rounding to a stamp has a standard deviation of its length over sqrt(12)
+    tolerance = 2.0 * stamp / math.sqrt(12.0 * float(rows @ rows)) / period
+    return time.size / (first.size + 1), f"{1.0 / _roundest(period, tolerance):.9g}"
+
+
+def _roundest(period: float, tolerance: float) -> float:
+    """Return the period of few digits, or of a rate of few, within a part of ``period``."""
+    for digits in range(1, 9):
+        for found in (float(f"{period:.{digits}g}"), 1.0 / float(f"{1.0 / period:.{digits}g}")):
+            if abs(found / period - 1.0) <= min(tolerance, 0.01):
+                return found
+    return period

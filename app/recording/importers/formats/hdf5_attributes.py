@@ -1,0 +1,88 @@
+"""Attributes of HDF5 objects as the programs that write them mean them."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from collections.abc import Callable
+
+import h5py
+import numpy as np
+
+from dearig.recording.importers.source import PARSER_FAILURES
+
+__all__ = ["ATTRIBUTE_MAX", "numbers_in", "pickled_texts", "texts_in", "unpacked"]
+
+#: Bytes of an attribute that is read.
+ATTRIBUTE_MAX = 2**14
+#: A text in a pickle of protocol 0, in which pandas writes names.
+_PICKLED = re.compile(r"(?:^|[(\[a}sl\n])V([^\n]*)\n")
+
+
+def texts_in(owner: h5py.Group | h5py.Dataset, name: str) -> list[str]:
+    """Return the texts in the attribute ``name`` of ``owner``; none if it is something else."""
+    return [_plain(text) for text in _values(owner, name) if isinstance(text, str)]
+
+
+def numbers_in(owner: h5py.Group | h5py.Dataset, name: str) -> list[float]:
+    """Return the numbers in the attribute ``name`` of ``owner``."""
+    return [v for v in _values(owner, name) if isinstance(v, (int, float))]
+
+
+def _values(owner: h5py.Group | h5py.Dataset, name: str) -> list[object]:
+    if name not in owner.attrs:
+        return []
+    attribute = owner.attrs.get_id(name)
+    if attribute.get_storage_size() > ATTRIBUTE_MAX:
+        return []
+    try:
+        found = np.ravel(owner.attrs[name]).tolist()
+    except PARSER_FAILURES:
+        return []
+    return [v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in found]
+
+
+def _plain(text: str) -> str:
+    """Return ``text``; of PyMoDAQ, which writes the representation of a text as JSON, its text."""
+    if not text.startswith('{"module"'):
+        return text
+    try:
+        found = json.loads(text)
+        inner = found["data"] if isinstance(found, dict) and found.get("type") == "str" else text
+        plain = ast.literal_eval(inner) if inner is not text else text
+    except (ValueError, KeyError, TypeError, SyntaxError, RecursionError, MemoryError):
+        return text
+    return plain if isinstance(plain, str) else text
+
+
+def pickled_texts(owner: h5py.Group | h5py.Dataset, name: str) -> list[str]:
+    """Return the texts in a pickle that pandas wrote as an attribute; it is never unpickled.
+
+    Other protocols than 0, the one of HDF5 files, give none.
+    """
+    return [
+        text for pickle in _values(owner, name) if isinstance(pickle, str)
+        for text in _PICKLED.findall(pickle)
+    ]  # fmt: skip
+
+
+def unpacked(data: h5py.Dataset) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Return what makes numbers of the stored values of ``data``, as CF says; None if nothing.
+
+    ``scale_factor`` and ``add_offset`` scale; ``_FillValue`` and ``missing_value`` are gaps.
+    """
+    scale = next(iter(numbers_in(data, "scale_factor")), 1.0)
+    offset = next(iter(numbers_in(data, "add_offset")), 0.0)
+    gaps = [*numbers_in(data, "_FillValue"), *numbers_in(data, "missing_value")]
+    if scale == 1.0 and offset == 0.0 and not gaps:
+        return None
+
+    def unpack(values: np.ndarray) -> np.ndarray:
+        found = values.astype(np.float64) * scale + offset
+        for gap in gaps:
+            with np.errstate(all="ignore"):
+                found[values == np.asarray(gap).astype(values.dtype)] = np.nan
+        return found
+
+    return unpack

@@ -1,0 +1,1 @@
+"""Small changes of the code, of which the tests have to notice one after another."""
