@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dearig.batch.trends import Trend, Trends
+from dearig.batch.trend import Trend
+from dearig.batch.trends import Trends
 from dearig.report.figures.style import (
     ERROR,
     MEASURED,
