@@ -9,6 +9,7 @@ import numpy as np
 
 from dearig.batch.trend import Trend
 from dearig.batch.trends import Trends
+from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
     ERROR,
     MEASURED,
@@ -18,7 +19,6 @@ from dearig.report.figures.style import (
     blank,
     drawable,
     few_ticks,
-    style,
 )
 from dearig.report.text.trends import number_name
 
