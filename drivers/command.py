@@ -13,7 +13,7 @@ __all__ = ["Command"]
 class Command:
     """Output counts of a run that plays ``waveform``, with the ``scaling`` of the output.
 
-    They are computed where they are asked for: a long waveform is never held whole. Of a waveform
+    They are computed on request: a long waveform is never held whole. Of a waveform
     that grows, only the first ``available`` samples can be had.
     """
 

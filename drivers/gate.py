@@ -226,7 +226,7 @@ class _Pieces:
     """A waveform in pieces of ``length`` samples, read from ``source`` once and checked after that.
 
     The first reading hashes each piece. A piece that is read again is compared with its hash. The
-    newest pieces are kept as bytes, which nobody can change; a waveform that is kept whole is never
+    newest pieces are kept as bytes, which cannot change; a waveform that is kept whole is never
     read again. Pieces of a waveform that ``grows`` are taken in one by one, by ``grow``.
     """
 
@@ -411,8 +411,8 @@ class BlockGate:
     """Gate of a waveform that is corrected while it is played; ``open_block_gate`` makes it.
 
     A correction is a part of the feedforward's voltage: sample k of ``waveform`` is
-    ``feedforward[k] * (1 + c[k])`` and is computed here, from samples that have passed. Whoever
-    corrects gives one number for each block, the correction at its last sample. From the end of the
+    ``feedforward[k] * (1 + c[k])`` and is computed here, from passed samples. A controller
+    gives one number for each block, the correction at its last sample. From the end of the
     block before it changes linearly. Nothing else that it gives can reach an output.
 
     Every block is checked before it can be played: the correction against the ``authority`` and the

@@ -336,10 +336,10 @@ class Interlocks:
             readings = np.concatenate((np.full(2 * lag, readings[0]), readings))
         self._last_readings = readings[-2 * lag :].copy()
         # distance to the straight line through earlier readings: fast motion is not a jump
-        beside = readings[2 * lag :] - 2 * readings[lag:-lag] + readings[: -2 * lag]
-        at = self._broken["jump"].first(np.abs(beside) >= self._jump_counts)
+        around = readings[2 * lag :] - 2 * readings[lag:-lag] + readings[: -2 * lag]
+        at = self._broken["jump"].first(np.abs(around) >= self._jump_counts)
         if at is not None:
-            jump = int(beside[at]) * _step(self._laser)
+            jump = int(around[at]) * _step(self._laser)
             yield self._trip(
                 "jump",
                 at,

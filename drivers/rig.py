@@ -131,7 +131,7 @@ class Rig(Protocol):
         ...
 
     def make_safe(self) -> None:
-        """Take the output to 0 V at once and discard the waveform."""
+        """Take the output to 0 V immediately and discard the waveform."""
         ...
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Values at the ticks of a clock, computed where they are asked for instead of held in memory."""
+"""Values at the ticks of a clock, computed on request instead of held in memory."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Samples(Protocol):
     def window(self, start: int, stop: int) -> np.ndarray:
         """Return the samples ``start`` to ``stop`` (stop - start,), 0 <= start <= stop.
 
-        The same window has the same values whenever it is asked for. A window that reaches beyond
+        The same window has the same values at every request. A window that reaches beyond
         the last sample ends there.
         """
         ...

@@ -13,7 +13,7 @@ __all__ = ["AT_START", "ROOT", "loaded", "version"]
 
 #: Folder of this package.
 ROOT = Path(__file__).resolve().parent
-_DIGITS = 16  # of each digest: enough to detect a change that nobody made on purpose
+_DIGITS = 16  # of each digest: enough to detect an accidental change
 
 #: Digests by path of all modules of this package when this process imported the first of them.
 AT_START = {

@@ -305,7 +305,7 @@ class DiagnoseResult:
 
     @property
     def headline(self) -> str:
-        """The verdict in words."""
+        """The verdict as a sentence."""
         return words.headline(self.outcome)
 
     @property

@@ -41,7 +41,7 @@ class Sequence:
         )
 
     The keys are those of a sequence file; ``dearig.Sequence.kinds()`` lists the kinds. A wrong key
-    or value raises ``InputError`` at once, a sequence that does not end at 0 V when it is used.
+    or value raises ``InputError`` immediately, a sequence that does not end at 0 V when it is used.
 
     Parameters
     ----------

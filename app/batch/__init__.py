@@ -1,1 +1,1 @@
-"""Many runs, one after the other without a person beside them, and many fits."""
+"""Many unattended runs, one after the other, and many fits."""

@@ -1,4 +1,4 @@
-"""Commands for many runs without a person beside them: campaign, campaign-queue."""
+"""Commands for many unattended runs: campaign, campaign-queue."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def campaign_queue(
 ) -> None:
     """Show the runs of a campaign, or change the order of those that wait.
 
-    The running campaign reads what is asked between two runs; it never starts a run by itself that
+    The running campaign reads what is asked between two runs; it never starts a run on its own that
     was not armed. A run that goes on is ended with ctrl-C where the campaign runs.
     """
     from dearig.batch.ask import ask

@@ -297,7 +297,10 @@ def export(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FILE", help="Write to this file.", show_default="beside the recording"
+            "--out",
+            metavar="FILE",
+            help="Write to this file.",
+            show_default="next to the recording",
         ),
     ] = None,
     json: Json = None,

@@ -73,7 +73,7 @@ def hold(
         float, typer.Option(help="Fastest change of the correction, in % of the voltage per s.")
     ] = 1.0,
     response_s: Annotated[
-        float, typer.Option(help="Response time of the loop in s, beside its delay.")
+        float, typer.Option(help="Response time of the loop in s, in addition to its delay.")
     ] = 1.0,
     ahead_s: Annotated[
         float,

@@ -85,7 +85,7 @@ def identify_table(outcome: IdentifyOutcome) -> RenderableType:
 
 
 def validate_tables(outcome: ValidateOutcome) -> RenderableType:
-    """Return the errors of every recording, beside the thesis's Tables 4 and 5 where they apply."""
+    """Return the errors of every recording, with the thesis's Tables 4 and 5 where they apply."""
     return _Fitted(
         [*validate_summary(outcome), *_grouped("By recording", outcome.comparisons)],
         warnings_of(outcome),

@@ -26,7 +26,7 @@ def pdf(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="OUT.pdf", help="File to write.", show_default="beside the report"
+            "--out", metavar="OUT.pdf", help="File to write.", show_default="next to the report"
         ),
     ] = None,
     force: Force = False,
@@ -70,7 +70,7 @@ def target_file(
     out: ToWrite,
     force: Force = False,
 ) -> None:
-    """Write a target file: a displacement that the film shall follow."""
+    """Write a target file: a displacement that the film should follow."""
     from dearig.config.targetfile import EXAMPLE
 
     _write_example(EXAMPLE, out, force)

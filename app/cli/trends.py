@@ -31,7 +31,7 @@ def trends(
             "--out",
             metavar="DIR",
             help="Folder for the tables and the report.",
-            show_default="beside the table",
+            show_default="next to the table",
         ),
     ] = None,
     number: Annotated[
@@ -53,7 +53,7 @@ def trends(
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Say what changes the numbers of many recordings: in all films, in one, and when.
+    """Find what drives parameter changes across recordings: in all films, in one, and when.
 
     Each number is fitted by a mixed model with a random intercept of each film.
     """

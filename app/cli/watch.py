@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dearig.cli.last_words import output_failure
 from dearig.cli.options import Force, Json
 from dearig.cli.output import check_files, console_for, print_line, write_result
 from dearig.errors import InputError
@@ -77,7 +78,7 @@ def watch(
             show_default="0.5, and 0.1 for the page",
         ),
     ] = None,
-    once: Annotated[bool, typer.Option("--once", help="Look once, and end.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="Print one snapshot and exit.")] = False,
     json: Json = None,
     force: Force = False,
 ) -> None:
@@ -121,8 +122,8 @@ def _serve(
         if shared:
             print_line(
                 console,
-                "Whoever has this address can look on; nobody can change anything. The connection "
-                "is not encrypted.",
+                "Everyone who has this address can watch; no one can change anything. "
+                "The connection is not encrypted.",
             )
 
     serve_watch(view, port, host, token, every, started)
@@ -137,7 +138,7 @@ def _show(view: SourceWatch, console: Console, every: float) -> None:
         with Live(
             shown, console=console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
         ) as live:
-            while not view.ended:
+            while not view.ended and output_failure() is None:
                 time.sleep(every)
                 live.update(_look(view, console), refresh=True)
     except KeyboardInterrupt:

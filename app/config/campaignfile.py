@@ -34,6 +34,7 @@ from dearig.errors import InputError
 
 __all__ = [
     "EXAMPLE",
+    "PLAN_TABLE",
     "Band",
     "Campaign",
     "PlannedRun",
@@ -52,11 +53,11 @@ TEXT_MAX = 2**27
 
 #: A plan that the rig of the thesis can play.
 EXAMPLE = """\
-# A campaign: many runs, one after the other, without a person beside them. Edit it, then
+# A campaign: many unattended runs, one after the other.
 #   dearig campaign FILE.toml --rig sim --out DIR --check    (says how long it takes; plays nothing)
 #   dearig campaign FILE.toml --rig sim --out DIR
 name = "ageing"
-sequence = "validation-b-6.0"   # a preset, or a sequence file beside this one
+sequence = "validation-b-6.0"   # a preset, or a sequence file in this folder
 repeat = 2                      # times that each setting is played
 rest_s = 5.0                    # time at 0 V between two runs
 order = "random"                # or "as_written"
@@ -87,7 +88,7 @@ identify = false                # fit the model to the recording
 validate = false                # compare the recording with the last model
 diagnose = false                # find what the model lacks, which may take minutes
 branches = 3                    # of the fitted model
-# model = "model.toml"          # the first model of validate, beside this file
+# model = "model.toml"          # the first model of validate, in this folder
 # stop_when = ["mu_0_kPa < 40"] # the campaign stops when a number leaves its band
 
 # a lifetime test: the recordings of other runs are reduced to the extremes of each cycle
@@ -97,7 +98,7 @@ every_cycle = 0                 # of the others keep every n-th cycle at full ra
 
 # notifications, sent after a run, at 0 V
 # [notify]
-# command = ["python", "tell.py"]             # a program, which gets JSON on its standard input
+# command = ["python", "notify.py"]           # a program, which gets JSON on its standard input
 # webhook = "env:LAB_WEBHOOK"                 # an address, or a variable that has it
 # on = ["run-ended", "tripped", "queue-stopped"]
 # timeout_s = 30.0                            # time for the program, and for the webhook's answer
@@ -132,7 +133,7 @@ class _After(Table):
     branches: int = Field(default=3, ge=1, le=10, description="branches of the fitted model")
     model: str | None = Field(
         default=None, min_length=1, max_length=NAME_MAX,
-        description="model file beside the plan, the first one of validate",
+        description="model file in the plan's folder, the first one of validate",
     )  # fmt: skip
     stop_when: list[str] = Field(
         default_factory=list, max_length=100, description="bands of numbers"
@@ -176,6 +177,9 @@ class _File(Table):
     keep: _Keep = Field(default=_Keep(), description="which recordings are kept whole")
     notify: NotifyTable = Field(default=NotifyTable(), description="notifications")
 
+
+#: Fields of a plan's top level, for a form.
+PLAN_TABLE: type[Table] = _File
 
 _COMPARISONS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
     {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}

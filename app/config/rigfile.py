@@ -110,7 +110,7 @@ class RecordingSection(Section):
     lost_file: Literal["ramp", "new_file"] = Field(
         default="ramp",
         description="what a run does when another program deletes, moves, replaces or overwrites "
-        "its file: ramp to 0 V, or go on in a new file beside it",
+        "its file: ramp to 0 V, or continue in a new file next to it",
     )
 
 

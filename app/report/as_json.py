@@ -205,6 +205,7 @@ def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:
 
 def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
     """``outcome`` for ``--json`` of diagnose, in the units that the keys end with."""
+    # One piece: the document key by key, as the page on JSON lists it.
     finding, shown = outcome.finding, SHOWN[outcome.kind]
     before, after = outcome.before, outcome.after
     experiment = outcome.experiment
@@ -275,7 +276,6 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "seconds": _number(experiment.seconds),
         },
         "experiment_words": outcome.experiment_words,
-        "experiment_summary": outcome.experiment_words,
         "rounds": [
             {
                 "base": list(r.base),

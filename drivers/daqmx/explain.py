@@ -26,7 +26,7 @@ __all__ = [
     "instrument_errors",
 ]
 
-ABORTED = (-88708, -88709, -200088)  #: a reset ended the task, or somebody cleared it
+ABORTED = (-88708, -88709, -200088)  #: a reset ended the task, or a program cleared it
 RESERVED = -50103  #: another task holds the card
 TIMEOUT = -200284  #: samples did not arrive in time
 WATCHDOG_EXPIRED = -200644  #: the card's watchdog has acted

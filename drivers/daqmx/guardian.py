@@ -37,7 +37,7 @@ _STARTS_WITHIN = 60.0  # s: an interpreter, the driver's library, a connection
 _HEARS_WITHIN = 0.3
 _LATE = 0.05  # s for an acknowledgement that the listener has read at this moment
 _ANSWERS_WITHIN = 0.5  # s from a word other than a beat to its acknowledgement
-_TAKES_OVER_WITHIN = 5.0  # s; it keeps trying after that, but the operator must be told
+_TAKES_OVER_WITHIN = 5.0  # s; it keeps trying after that, but the operator is notified
 _ENDS_WITHIN = 5.0  # s
 # s; a process that has ended has written its error by then, and the message must not wait longer
 _ERROR_WITHIN = 0.5
@@ -85,12 +85,12 @@ class Guardian(Protocol):
 
     @property
     def granted(self) -> tuple[str, ...]:
-        """Return what the system granted it, such as real-time priority, in words."""
+        """Return what the system granted it, such as real-time priority, as text."""
         ...
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Return what the system refused it, in words."""
+        """Return what the system refused it, as text."""
         ...
 
     def arm(self) -> None:
@@ -135,7 +135,7 @@ class Guardian(Protocol):
 
 
 class GuardianProcess:
-    """A guardian for the card at ``address``, started at once.
+    """A guardian for the card at ``address``, started immediately.
 
     Raises ``RigError`` when it cannot be started, does not reach the card or runs other sources
     than this program, with the last line of its error stream. ``clock`` measures its answers.
@@ -202,12 +202,12 @@ class GuardianProcess:
 
     @property
     def granted(self) -> tuple[str, ...]:
-        """Return what the system granted it, such as real-time priority, in words."""
+        """Return what the system granted it, such as real-time priority, as text."""
         return tuple(self._ready["granted"]) if self._ready else ()
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Return what the system refused it, in words."""
+        """Return what the system refused it, as text."""
         return tuple(self._ready["refused"]) if self._ready else ()
 
     def arm(self) -> None:
@@ -312,7 +312,7 @@ class GuardianProcess:
         return report
 
     def close(self) -> None:
-        """End the guardian; one that still tries to reach the card goes on and reports the end."""
+        """End the guardian; one that still tries to reach the card reports its end."""
         self._send("bye")
         if self._process.stdin is not None:
             with contextlib.suppress(OSError):  # it has ended and closed its end of the pipe
@@ -369,7 +369,7 @@ class GuardianProcess:
         return True
 
     def _listen(self) -> None:
-        """Read the guardian's lines at once, so that it never waits for this process.
+        """Read the guardian's lines immediately, so that it never waits for this process.
 
         The stream stays open as long as the guardian lives, even after ``close``: one that still
         tries to reach the card must be able to write.

@@ -20,7 +20,7 @@ class DaqmxKind:
     simulated = False
 
     def open(self, address: str, settings: RigSettings, options: RigOptions) -> Rig:  # noqa: ARG002
-        """Return the rig at ``address``, with a guardian process beside it."""
+        """Return the rig at ``address``, with a guardian process."""
         return rig.open_daqmx_rig(address, settings)
 
     def inspect(

@@ -143,7 +143,7 @@ def _channel_with_deadline(
         # only the address of the host is looked up, not its service configuration
         ("grpc.service_config_disable_resolution", 1),
     )
-    # the scheme is given, so that no part of the host is taken for another one
+    # the scheme is given, so that no part of the host is read as another one
     target = f"dns:///{server}"
     if card.tls_ca:
         channel = grpc.secure_channel(target, _credentials(card), options=options)

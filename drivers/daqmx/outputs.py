@@ -28,7 +28,7 @@ T = TypeVar("T")
 
 _MONITOR_READINGS = 20  # the amplifier's output falls in less than a millisecond
 _AVERAGED = 10  # values of an input, whose mean is one reading
-_OUTPUT, _ENABLE = "output", "enable line"  # keys of the tasks, beside the names of the inputs
+_OUTPUT, _ENABLE = "output", "enable line"  # keys of the tasks, with the inputs' names
 
 
 class Outputs:

@@ -109,7 +109,7 @@ class DaqmxRig:
 
     @property
     def guardian_tries(self) -> bool:
-        """Return True while the guardian goes on trying to set 0 V, after ``make_safe`` failed."""
+        """Return True while the guardian still tries to set 0 V, after ``make_safe`` failed."""
         return self._guardian.tries
 
     def await_guardian(self, within: float) -> TakeOver | None:
@@ -232,7 +232,7 @@ class DaqmxRig:
             self._stop(*self._loaded())
 
     def make_safe(self) -> None:
-        """Take the output to 0 V at once, check it on the monitor, and discard the waveform.
+        """Take the output to 0 V immediately, check it on the monitor, and discard the waveform.
 
         A card that this rig does not use is not reset. Raises ``RigError`` where neither this
         program nor the guardian could do so.

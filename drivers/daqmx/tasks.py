@@ -182,7 +182,7 @@ class ClockedTasks:
         if left <= 0:
             return
         room = self._buffer - (self._written - max(delivered, self._first))
-        # wait for room for a large piece; what became available while it is played goes out at once
+        # wait for room for a large piece; what became available during play goes out now
         if room >= self._buffer // 4 or room >= left:
             self._write(room)
 

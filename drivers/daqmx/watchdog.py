@@ -1,4 +1,4 @@
-"""Hardware watchdog of the card in words: whether it is wired, and what that means."""
+"""Description of the card's hardware watchdog: whether it is wired, and what that means."""
 
 from __future__ import annotations
 

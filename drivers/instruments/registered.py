@@ -26,7 +26,7 @@ _ROLES = ("laser", "amplifier", "thermohygrometer")
 
 
 def _check(name: str, driver: Any) -> None:
-    # all kinds of drivers have these members; the role tells them apart
+    # all kinds of drivers have these members; the role distinguishes them
     role = getattr(driver, "role", None)
     if role not in _ROLES or not callable(getattr(driver, "inspect", None)):
         raise TypeError(f"{name} is no driver: it needs a role ({' or '.join(_ROLES)}) and inspect")

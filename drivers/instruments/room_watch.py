@@ -1,4 +1,4 @@
-"""A thermo-hygrometer that is read on a thread of its own, beside a run.
+"""A thermo-hygrometer that is read in a separate thread during a run.
 
 A serial line may stall for seconds, and the loop of a run must not. The loop takes the newest
 reading and its age; a value that is too old is never handed on as a present one.

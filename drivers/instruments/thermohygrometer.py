@@ -37,7 +37,7 @@ class ThermohygrometerError(RigError):
 class RoomReading:
     """A reading in degrees Celsius and per cent; NaN where the sensor gave no value.
 
-    ``age`` in s is that of the reading when it was asked for. ``trouble`` says why there is no
+    ``age`` in s is that of the reading at the time of the request. ``trouble`` says why there is no
     value, or is "".
     """
 
@@ -53,7 +53,7 @@ class RoomReading:
 
     @property
     def shown(self) -> str:
-        """Return the values in words."""
+        """Return the values as text."""
         celsius = f"{self.temperature:.1f} °C" if math.isfinite(self.temperature) else "no °C"
         percent = f"{self.humidity:.1f} %" if math.isfinite(self.humidity) else "no humidity"
         return f"{celsius}, {percent}"
@@ -103,7 +103,7 @@ class ThermohygrometerDriver(Protocol):
 
 
 class RoomSource(Protocol):
-    """What a run asks for the room: a sensor that is read beside the run, or a simulated one."""
+    """Source of the room's values in a run: a sensor that is read during it, or a simulated one."""
 
     def reading(self, elapsed: float) -> RoomReading:
         """Return the newest reading ``elapsed`` s after the first sample; it never waits.

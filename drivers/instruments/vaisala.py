@@ -57,7 +57,7 @@ class VaisalaProbe:
         self._stopped = False
 
     def read(self) -> RoomReading:
-        """Ask for a reading and return it; a lost or garbled line is asked for again.
+        """Ask for a reading and return it; a lost or garbled line is requested again.
 
         Raises ``ThermohygrometerError`` where the probe does not answer, in bounded time whatever
         the port delivers.
@@ -79,7 +79,7 @@ class VaisalaProbe:
                     if reading is not None:
                         return reading
                     words = line.strip(b" >").upper()
-                    # an echo of a command, with the prompt before it, is no answer
+                    # an echo of a command, with the prompt before it, is not an answer
                     if words not in (b"", b"S", command.strip()):
                         seen = line.strip()
         except OSError as error:

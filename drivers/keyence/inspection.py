@@ -25,12 +25,12 @@ def inspect(
     """
     name = settings.model
     if not settings.port:
-        nobody = Finding(
+        silent = Finding(
             name, "serial port", "none in the rig file", verdict="not wired",
             advice="set laser.port to compare the controller's settings; until then "
             "laser.mm_per_V, sampling_us and averaging are not checked",
         )  # fmt: skip
-        return LaserInspection((nobody,))
+        return LaserInspection((silent,))
     findings: list[Finding] = []
     reading: float | NoReading = NoReading.INVALID
     scale = None

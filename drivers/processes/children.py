@@ -72,7 +72,7 @@ def isolated_command(module: str, *arguments: str) -> list[str]:
 
 
 def has_unread(pipe: IO[str] | None) -> bool:
-    """Return True if ``pipe`` holds data that nobody has read yet; it never waits.
+    """Return True if ``pipe`` holds data that was not read yet; it never waits.
 
     On Windows it returns False: a look into a pipe waits there while another thread reads it.
     """

@@ -26,7 +26,7 @@ _CAP_IPC_LOCK = 14  # from <linux/capability.h>: to lock memory beyond the limit
 def claim() -> tuple[list[str], list[str]]:
     """Ask for the highest priority and for locked memory, for all threads of this process.
 
-    Returns what was granted and what was refused, each in words.
+    Returns what was granted and what was refused, each as text.
     """
     granted: list[str] = []
     refused: list[str] = []
@@ -43,7 +43,7 @@ def claim() -> tuple[list[str], list[str]]:
 
 
 def _requests() -> list[list[tuple[str, Callable[[], None]]]]:
-    """Return the requests in words, grouped: the first one granted of each group suffices."""
+    """Return the requests as text, grouped: the first one granted of each group suffices."""
     if sys.platform == "win32":
         return [
             [("real-time priority", lambda: _windows_class(_REALTIME_CLASS)),

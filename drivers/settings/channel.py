@@ -1,4 +1,4 @@
-"""Settings of the channels beside the amplifier's and the laser's: declared ones, thermometer."""
+"""Settings of further channels: declared ones, thermometer."""
 
 from __future__ import annotations
 

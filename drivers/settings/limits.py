@@ -71,7 +71,7 @@ class LimitsSettings(Section):
 
 
 class InterlockSettings(Section):
-    """Interlocks that end a run while it goes on: threshold, debounce time and action of each."""
+    """Interlocks that end a run in progress: threshold, debounce time and action of each."""
 
     monitor_tolerance_kV: float = Field(
         default=1.5,

@@ -3,7 +3,7 @@
 The method is that of A. Schoellig, F. Mueller and R. D'Andrea, Autonomous Robots 33, 103 (2012):
 each run gives an estimate of what the model lacks along the path,
 
-    d_j = measured - reading of the model under the same voltage,
+    d_j = measured - reading of the model under the same voltage,                       (1)
 
 and the next voltage is the one with which the model follows ``reference - Q d_j``, computed under
 all limits of the voltage (``inversion``). It was chosen because the limits act inside the
@@ -12,7 +12,7 @@ with the learning filter L = 1/(r G), G of the linearised model. The known condi
 Bristow, M. Tharayil and A. G. Alleyne, IEEE Control Systems 26(3), 96 (2006)): the error shrinks
 from run to run, at every frequency, where
 
-    |Q (1 - L G_true)| = |Q| W < 1,    W = |G_true/(r G) - 1|.
+    |Q (1 - L G_true)| = |Q| W < 1,    W = |G_true/(r G) - 1|.                          (2)
 
 The ratio r of the film's response to the model's is that of the first run, where the path has
 power: learning by the measured response, as K.-S. Kim and Q. Zou, IEEE/ASME Trans. Mechatronics 18,
@@ -203,6 +203,7 @@ class Learner:
         )
         self._noise = noise = found.noise
         usable, notes = found.usable, found.notes
+        # (1), with readings that cannot be used interpolated
         lacking = bridged(found.values - self._now.reading, self._known, usable)
         reading = self._now.reading + lacking  # without what was sorted out
         counted = usable & self.first.reachable & ~self._let_go(reading, notes)
@@ -232,7 +233,7 @@ class Learner:
                 one.mean_square(noise, both) for one in (run, best)
             )
             scatter = settings.significant * np.hypot(within, before_within)
-            # what did not repeat and was learned adds its power to the error, and no more
+            # two standard errors; what did not repeat and was learned adds at most its power
             added = 0.0 if self._learned is None else self._learned.power
             if now > before + added + scatter:
                 return self._step_back(best, rms, largest, samples, notes)
@@ -243,7 +244,7 @@ class Learner:
         self._best = replace(run, lacking=self._repeated(lacking, notes))
         return self._follow(self._best, rms, largest, samples, notes)
 
-    # ------------------------------------------------------------ next voltage
+    # ------------------------------------------------------------ next voltage: reference - Q d
 
     def _follow(
         self, run: _Run, rms: float, largest: float, samples: int, notes: list[str]
@@ -264,6 +265,7 @@ class Learner:
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
         change = np.where(self._inside, run.lacking - run.known, 0.0)
         weight = self._beyond_noise(change)
+        # Q (d_j - d_(j-1)) over r, less the part that is noise
         step = self._over_ratio(low_pass(change, self._rate, edge), weight)
         self._known = run.known + step
         self._learned = _Step(run.left, edge, _mean_square(step[run.counted]))
@@ -308,7 +310,7 @@ class Learner:
     ) -> Lesson:
         return Lesson(rms, largest, samples, self.voltage, learned, edge, contraction, tuple(notes))
 
-    # ------------------------------------------------------------ uncertainty
+    # ------------------------------------------------------------ uncertainty: W and r of (2)
 
     def _spread(self, alternatives: Sequence[Actuator]) -> np.ndarray:
         """Return |G_other/(k G) - 1| (M,), the root of the squares of all ``alternatives``.

@@ -1,11 +1,12 @@
 """One criterion for every choice of a diagnosis: minus twice the logarithm of the evidence.
 
-    C = n ln(c + delta^2 (c0 - c)) + k ln n + log det(drift)
+    C = n ln(c + delta^2 (c0 - c)) + k ln n + log det(drift)            (8)
 
 c is the mean square of the whitened residuals over the noise, c0 that of the baseline, k the number
 of fitted parameters. No law is true to more than delta of what it explains. n counts independent
 samples: the readings over the least correlation time of any fit so far, one n for the whole
 diagnosis. (Schwarz, Annals of Statistics 6, 461 (1978); the scale of the noise is marginalised.)
+Numbers of equations are those of ``app/docs/explanation/diagnosis.md``.
 """
 
 from __future__ import annotations
@@ -166,6 +167,7 @@ class Judge:
             if not families
             for family in set(sought) - alone
         ]
+        # (9), relative to the largest term
         least = min(score for score, _ in scores)
         weights = [math.exp(-0.5 * (score - least) / s.tempering) for score, _ in scores]
         total = sum(weights)

@@ -1,4 +1,7 @@
-"""Output-error fits of candidates: values, and the fitter that makes them."""
+"""Output-error fits of candidates: values, and the fitter that makes them.
+
+Numbers of equations are those of ``app/docs/explanation/diagnosis.md``.
+"""
 
 from __future__ import annotations
 
@@ -210,7 +213,7 @@ class Fitter:
         self._pink_density = 0.0
         self._limits = np.zeros(0, dtype=bool)
 
-    # -- problems
+    # -- problems: records as the search reads them
 
     def _prepared(self, model: Actuator | Strip) -> tuple[Record, ...]:
         # what a model of a rubber gets wrong no averaging takes away
@@ -235,6 +238,8 @@ class Fitter:
     def has_tails(self) -> bool:
         """Whether the noise of a record at rest has heavier tails than a normal distribution."""
         return any(a is not b for a, b in zip(self.full, self.raw, strict=True))
+
+    # -- noise: B and L of (6), pseudo-values (7), masks of spikes
 
     def space(self, full: bool = False) -> DriftSpace:
         """Return the directions in which the records may drift."""
@@ -299,6 +304,8 @@ class Fitter:
         # modes are lower by j^-2
         return [2.0 * density * number**3 / r.noise**2 for r in records] if density else None
 
+    # -- what is fitted: which numbers of a model are free, in which noise
+
     def problem(
         self,
         model: Actuator | Strip,
@@ -358,7 +365,7 @@ class Fitter:
             self._coarse[layout.names] = plain.find_coarse_columns(x, ~self.fixed(layout))
         return self._coarse[layout.names]
 
-    # -- fits
+    # -- fits: secants to compare, Levenberg-Marquardt to end, every sample to report
 
     def map(self, work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
         """Return ``work(job)`` for each of ``jobs``, which are independent fits."""
@@ -428,6 +435,8 @@ class Fitter:
         recentre(problem, careful.problem, careful.problem.layout.values(careful.x))
         return problem
 
+    # -- coordinates of starts
+
     def start_of(
         self, problem: WhitenedProblem, parent: np.ndarray, values: Sequence[float]
     ) -> np.ndarray:
@@ -446,7 +455,7 @@ class Fitter:
         row[t] = times
         return layout.coordinates(row)
 
-    # -- the baseline
+    # -- the baseline: springs without effects, from a global search
 
     def baseline(self, progress: Callable[[str, float], None]) -> Fit:
         """Return the model without effects, fitted from a global search of its springs."""

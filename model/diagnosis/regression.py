@@ -3,12 +3,12 @@
 With the stretch imposed, the misfit of a model with effects e is linear in the moduli mu of springs
 on a grid of relaxation times and in the coefficients a of effects' responses:
 
-    minimise |P mu - Y - D a|   over  mu >= 0, a within its bounds.
+    minimise |P mu - Y - D a|   over  mu >= 0, a within its bounds.     (4)
 
 P, Y and D are of ``dearig.model.diagnosis.imposed``, in units of the noise. The column of mu_0 is
 the whole derivative of the misfit, the rest stretch lam0(mu_0) included. One QR decomposition of P
 serves all effects; each point of an effect's shape parameters is then a small non-negative least
-squares problem.
+squares problem. Numbers of equations are those of ``app/docs/explanation/diagnosis.md``.
 """
 
 from __future__ import annotations
@@ -136,6 +136,7 @@ class Regression:
         self.columns = self._joined([i.columns for i in self._imposed])
         self.target = self._joined([i.target() for i in self._imposed])
         self._free_equilibrium()
+        # P = Q R: the parts of Y and D within the span of the springs, and beyond it
         self._q, self._triangle = np.linalg.qr(self.columns.T)
         self._inside = self._q.T @ self._wanted
         self._outside = self._wanted - self._q @ self._inside
@@ -145,7 +146,7 @@ class Regression:
             self._residuals = self._means(local[1])
             self._directions = well_determined(self._means(local[0].T).T)
 
-    # -- set-up
+    # -- set-up: P and Y of (4) by (1) to (3), as means, whitened by (6)
 
     def _impose(self, model: Actuator | Strip) -> list[ImposedActuator | ImposedStrip]:
         c = model.coefficients()
@@ -207,7 +208,7 @@ class Regression:
         there = self._misfit_of(moved, self._impose(moved))
         here = self._misfit_of(self.model, self._imposed)
         self.columns[0] = (there - here) / (_REST_STEP * modulus)
-        # about the parent's mu_0, at which the target was computed
+        # Y about the parent's mu_0, at which T was computed: the column of mu_0 is now a derivative
         network_part = modulus * self._joined([i.columns[0] for i in self._imposed])
         self._wanted = self.target - network_part + modulus * self.columns[0]
 
@@ -234,7 +235,7 @@ class Regression:
             rows.append(one.through(mu @ (parts - parts[:, :1])) - one.target())
         return self._joined(rows)
 
-    # -- least squares
+    # -- least squares: (4) for one effect in one shape
 
     def _rms(self, norm: float) -> float:
         return norm / math.sqrt(self.target.size)
@@ -281,6 +282,8 @@ class Regression:
             return None
         a, left = self._solve(columns)
         return self._weighed(left, a, columns), a, columns
+
+    # -- shapes and amplitudes: nonlinear parameters of a column of D
 
     def _sharpened(self, row: _Row, extent: Extent) -> _Row:
         """Return ``row`` after a pattern search of the effect's shape parameters.
@@ -339,11 +342,12 @@ class Regression:
         """
         if not electric(columns.effect.name):
             return self._rms(misfit)
+        # equation 5
         whole = float(np.linalg.norm(self.target))
         pull = float(np.linalg.norm(self.target + coefficients @ columns.rows))
         return self._rms(misfit) * whole / max(pull, 1e-9 * whole)
 
-    # -- starts
+    # -- starts: effects by (4), with the parent's springs moved, and with springs of the grid
 
     def starts(self, effects: Sequence[Effect], extent: Extent) -> dict[str, list[Start]]:
         """Return the best starts of each of ``effects``, best first; none of one without response.
@@ -398,6 +402,8 @@ class Regression:
             a = lsq_linear(beyond.T, -left, (low, high)).x
             step = -inverse @ (u.T @ (self._residuals + a @ rows))
         return columns.values(a), step
+
+    # -- springs of a start: the best nodes of the grid, then between the nodes
 
     def _branches(self, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return moduli (1 + n,) and times (n,) of the best set of branches that explain (M,)."""

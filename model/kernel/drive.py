@@ -201,6 +201,8 @@ def _follow(
     room: Workspace,
 ) -> tuple[int, int, int]:
     """Do what ``drive_by_voltage`` does: one compiled loop with its control."""
+    # One piece: step control carries some twenty numbers from sample to sample.
+    # Sections are those of EXPONENTIAL.md
     samples, held = time.shape[0], int(c[HELD])
     springs, branches, trace = room.springs, room.branches, room.trace
     before = room.before
@@ -224,6 +226,7 @@ def _follow(
         if not (dt > 0.0 and math.isfinite(v0) and math.isfinite(v1) and math.isfinite(dt)):
             status, reached = BAD_INPUT, k + 1
             break
+        # the pace for this interval, section 7
         if fresh:
             _start_ringing(c, springs, y, v0, room.work[0], trace)
             ringing, fresh = abs(trace[0]), False
@@ -234,7 +237,7 @@ def _follow(
             pace, dt_paced = pace_of(policy, film, dt), dt
         explicit = pace.explicit
         if explicit:
-            # how the field jumps, and how its slope does
+            # how the field jumps, and how its slope does: the jump of section 7
             sloped = (last * last - last_begin * last_begin) * (dt / dt_before)
             jump_before = jump
             jump = v1 * v1 - last * last - sloped
@@ -264,6 +267,7 @@ def _follow(
                 trace[0] += jump
                 trace[1] += jump
                 forced = 3.0 * min(abs(jump), abs(jump_before))
+            # the interval itself: the exponential method, or classical Runge-Kutta
             if policy.exponential:
                 more, row = _cross_exponentially(
                     policy, film, pace, c, room, row, grain, y,
@@ -276,6 +280,7 @@ def _follow(
                     fine // pace.steps, room.work, trace,
                 )  # fmt: skip
                 taken += fine
+            # what rings on; whether the film has become too stiff for an explicit method
             ringing = max(ringing * pace.fading, trace[2] * pace.per_phase2 - forced)
             explicit = admissible(springs, y)
             if explicit and stiffness_changed(y[0], lam_seen):
@@ -286,6 +291,7 @@ def _follow(
             if not explicit:
                 _copy(before, y, carried)
         last, last_begin, dt_before = v1, v0, dt
+        # the stiff method, section 8
         if not explicit:
             fresh = True
             taken += WORTH

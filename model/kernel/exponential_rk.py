@@ -108,6 +108,8 @@ def _steps(
     trace: np.ndarray,
 ) -> None:
     """Take the steps of ``exponential_steps``: one compiled kernel, all of it in registers."""
+    # One piece: the stages share some sixty numbers, which calls would send through memory.
+    # Sections and names are those of EXPONENTIAL.md: (z, v, i) is u of section 2
     n = y.shape[0] - 2 - MEMORY
     memory = y[2 + n :]
     load, electric_gain, over = table[0], table[1], table[14]
@@ -115,6 +117,8 @@ def _steps(
     m1, g1, r1 = table[5], table[6], table[7]
     m2, g2, r2 = table[8], table[9], table[10]
     m3, g3, r3 = table[11], table[12], table[13]
+    # section 4: E, (h/2) phi_1 and (h/2)^2 phi_2 over half a step; e^{Lh} on v; weights of N_1, of
+    # N_2 + N_3 and of N_4; e^{Lh} on I
     e11, e12, e13 = propagator[0], propagator[1], propagator[2]
     e21, e22, e23 = propagator[3], propagator[4], propagator[5]
     e31, e32, e33 = propagator[6], propagator[7], propagator[8]
@@ -131,7 +135,7 @@ def _steps(
     faded_half, faded = propagator[FADED_HALF], propagator[FADED]
     left_half, left = 1.0 - relaxation * faded_half, 1.0 - relaxation * faded
     s1, s2, s3 = branches[1, 0], branches[1, 1], branches[1, 2]
-    # I at the start of a step is the mean of the pulls on the branches, so weighted
+    # I_0 of section 2: at the start of a step the mean of the pulls on the branches, so weighted
     per_mean = -propagator[INVERSE_COUPLING] * propagator[INVERSE_RELAXATION]
     i1 = per_mean * branches[0, 0] * r1
     i2 = per_mean * branches[0, 1] * r2
@@ -156,7 +160,7 @@ def _steps(
         if acting:
             now, fa = supplied_at_start(acting, c, memory, t, lam, speed, va)
 
-        # stage 1: the start. Stages are written out: a loop over them would go through memory
+        # stage 1, the start: N_1. Stages are written out: a loop would go through memory
         p = lam * lam
         t1, t2, t3 = (
             _pull(p, x1 * x1, g1, 1.0),
@@ -180,7 +184,7 @@ def _steps(
         f1, f2, f3 = r1 * t1 + l1 * inner, r2 * t2 + l2 * inner, r3 * t3 + l3 * inner
         first = a + (d * speed - w * inner)
 
-        # stage 2: the middle, from the force at the start
+        # stage 2, the middle: u_2 = E u_0 + (h/2) phi_1 N_1 + (h/2)^2 phi_2 R/(h/2)
         bz = e12 * speed + e13 * inner
         bv = e22 * speed + e23 * inner
         bi = e32 * speed + e33 * inner
@@ -222,7 +226,7 @@ def _steps(
         o3 = r3 * t3 - (s3 * went + f3 * left_half)
         sum_1, sum_2, sum_3 = 2.0 * o1, 2.0 * o2, 2.0 * o3
 
-        # stage 3: the middle, from the force in the middle
+        # stage 3, the middle: u_3 = E u_0 + (h/2) phi_1 (N_2 - R) + (h/2)^2 phi_2 R/(h/2)
         push = second - rise
         z, v, i = bz + p1 * push, bv + p2 * push, bi + p3 * push
         z1 = (h1 + half * o1) + s1p * push
@@ -250,7 +254,7 @@ def _steps(
         o3 = r3 * t3 - (s3 * went + f3 * left_half)
         sum_1, sum_2, sum_3 = sum_1 + 2.0 * o1, sum_2 + 2.0 * o2, sum_3 + 2.0 * o3
 
-        # stage 4: the end, from the middle of stage 2
+        # stage 4, the end: u_4 = E u_2 + (h/2) phi_1 (2 N_3 - N_1 - R) + (h/2)^2 phi_2 R'/(h/2)
         slope = later * per_half
         bz = e11 * mid_z + e12 * mid_v + e13 * mid_i + q1 * slope
         bv = e21 * mid_z + e22 * mid_v + e23 * mid_i + q2 * slope
@@ -279,7 +283,7 @@ def _steps(
         fourth = a + (load + k * z + d * v - w * i)
         went = z - relaxation * i
 
-        # the step
+        # the step: e^{Lh} u_0 + h (weights of N_1, N_2 + N_3, N_4); section 5 for the branches
         lam0, both = lam, second + third
         lam += w1 * speed + w13 * inner + a1 * first + b1 * both + c1 * fourth
         gave = w3 * speed + (w33 - 1.0) * inner + a3 * first + b3 * both + c3 * fourth

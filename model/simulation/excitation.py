@@ -4,6 +4,8 @@ A segment is an immutable value with a duration, a voltage at its start and at i
 voltage in between. A sequence joins segments; where two do not meet, it refuses and says what to
 do. Sampling evaluates the exact function at the ticks of the output clock: boundaries need not
 fall on ticks (the thesis's lobes of 1/0.6 s never do).
+
+One piece: each kind of segment is some forty lines that rest on the same few.
 """
 
 from __future__ import annotations

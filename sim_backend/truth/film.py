@@ -363,7 +363,7 @@ def _derivative(
     stiffness: float,
     dy: np.ndarray,
 ) -> None:
-    """Return dy/dt under ``voltage`` and the present factors of the course."""
+    """Return dy/dt at the factors of the course. One piece: the equation, term by term."""
     lam, rate = y[0], y[1]
     away = lam - body.rest
     for j in range(2, _BRANCH):

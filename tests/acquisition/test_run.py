@@ -1,4 +1,7 @@
-"""A run that does not end well: 0 V first, then the file, then a sentence and the right code."""
+"""A run that does not end well: 0 V first, then the file, then a sentence and the right code.
+
+One piece: each way to end a run, with the same few checks of what is left.
+"""
 
 from __future__ import annotations
 

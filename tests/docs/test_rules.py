@@ -37,6 +37,25 @@ def long_functions(text: str) -> Iterator[tuple[str, int, str]]:
                 yield node.name, length, "\n".join(lines[node.lineno - 1 : first.lineno])
 
 
+def test_a_long_file_says_why_it_is_not_split() -> None:
+    silent = [
+        f"{path}: {text.count(chr(10))} lines"
+        for path, text in sources(*PRODUCT, "tests", ".ci")
+        if text.count("\n") > FILE_LINES and REASON not in "\n".join(text.splitlines()[:10])
+    ]
+    assert silent == []
+
+
+def test_a_long_function_says_why_it_is_not_split() -> None:
+    silent = [
+        f"{path}: {name}, {length} lines"
+        for path, text in sources(*PRODUCT, "tests", ".ci")
+        for name, length, head in long_functions(text)
+        if REASON not in head
+    ]
+    assert silent == []
+
+
 def test_the_length_of_a_function_is_that_of_its_body() -> None:
     body = "\n".join(["    x = 1"] * (FUNCTION_LINES + 1))
     text = f'def long(\n    a,\n):\n    """Do it.\n\n    At length.\n    """\n    # why\n{body}\n'
@@ -72,6 +91,11 @@ def sleeps(text: str) -> Iterator[int]:
             and "#" not in lines[node.lineno - 1]
         ):
             yield node.lineno
+
+
+def test_a_sleep_in_a_test_says_what_it_waits_for() -> None:
+    tests = [(path, text) for path, text in sources("tests") if path.name.startswith("test_")]
+    assert [f"{path}:{line}" for path, text in tests for line in sleeps(text)] == []
 
 
 @pytest.mark.parametrize("file", RECORDS, ids=lambda file: file.name[:4])

@@ -2,6 +2,7 @@
 
 The thesis's film (width held, Gent springs) with one effect, without step splitting or closed
 forms. Nothing here comes from kernels or effects; the tests of effects compare with it.
+One piece: a function for each effect, in the order of the library.
 """
 # ruff: noqa: ARG005 (the parts of an effect have one signature, as its hooks do)
 
@@ -140,6 +141,7 @@ def weights_of(p, word):
 
 def extra(name, p, film, drive):
     """``Extra`` of the effect ``name`` with the numbers ``p`` on ``film``; ``drive`` is v(t)."""
+    # One piece: each effect is a function of the same five names.
     rest = film.rest
 
     def amplifier_slew():

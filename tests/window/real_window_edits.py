@@ -30,6 +30,7 @@ dwell_s = 0.50
 
 
 def main() -> None:
+    # One piece: a story in one window, each step from where the one before ended.
     application = QApplication(sys.argv[:1])
     prepare_plots()
     folder = Path(sys.argv[1])

@@ -15,7 +15,7 @@ __all__ = ["Multisine"]
 
 
 class Multisine(SegmentTable):
-    """Several sines at once about an offset, with phases that keep the peak low."""
+    """Several simultaneous sines about an offset, with phases that keep the peak low."""
 
     example: ClassVar[dict[str, Any]] = {
         "amplitude_kV": 2.0, "frequencies_Hz": [0.5, 1.1, 2.3], "duration_s": 10.0,

@@ -22,7 +22,7 @@ __all__ = ["Csv"]
 
 
 class Csv(SegmentTable):
-    """A waveform from a CSV file beside the sequence; straight lines between its points."""
+    """A waveform from a CSV file next to the sequence; straight lines between its points."""
 
     example: ClassVar[dict[str, Any]] = {"file": "waveform.csv"}
     #: Columns that may hold the values, and V in a unit of each.

@@ -1,6 +1,6 @@
 """Write a recording during a run: counts are appended, and a kill loses nothing flushed.
 
-It is one thing of over 600 lines: the order of creating, appending, flushing and closing is what
+One piece: the order of creating, appending, flushing and closing is what
 makes a file survive, and each step relies on the ones before.
 
 The file survives kills at any moment and at every write boundary with the library version of

@@ -161,6 +161,7 @@ def film_record(seed=0, noise=20.0, effects=()):
     return network, FilmRecord("film", time, stretch, stress, noise)
 
 
+@pytest.mark.deep
 def test_what_a_film_lacks_does_not_decide_whether_its_springs_stiffen():
     network, record = film_record(effects=effect("slack", looseness=1.0))
     fits = []
@@ -173,6 +174,7 @@ def test_what_a_film_lacks_does_not_decide_whether_its_springs_stiffen():
     assert all(fit.held_limits == () for fit in fits)
 
 
+@pytest.mark.deep
 def test_a_film_of_two_branches_is_found_again():
     network, record = film_record()
     fit = identify([record], Strip(network), intervals=False)
@@ -404,13 +406,13 @@ def test_nothing_is_left_running_when_one_of_several_raises():
     def work(job):
         if job == 0:
             raise ModelError("ended")
-        time.sleep(0.05)
+        time.sleep(0.05)  # long enough for the error to come first
         done.append(job)
 
     with pytest.raises(ModelError, match="ended"):
         parallel_map(work, range(20), 2)
     finished = list(done)
-    time.sleep(0.2)
+    time.sleep(0.2)  # time in which nothing more may end; a slow machine cannot make it fail
     assert done == finished
     assert len(done) < 19
     assert parallel_map(lambda job: 2 * job, range(5), 2) == [0, 2, 4, 6, 8]
@@ -451,7 +453,7 @@ def test_who_is_one_of_several_at_work_does_its_own():
             names = set(parallel_map(inner, range(4), 2))
             if not any(n.startswith("fit") for n in names):
                 return names
-            time.sleep(0.01)
+            time.sleep(0.01)  # until the other has left, 200 times at most
         return set()
 
     _, helped = parallel_map(alone, range(2), 2, "fit")
