@@ -21,7 +21,8 @@ class Known(Enum):
 class OutputState:
     """State of the output at ``at`` s since 1970.
 
-    ``monitor`` is the reading of the voltage monitor in V at the film, None where it was not read.
+    ``monitor`` is the reading of the voltage monitor in V at the film, None where it was not read,
+    and ``tolerance`` the V within which it counts as 0 V (``limits.zero_tolerance_kV``).
     With ``by_guardian`` the guardian set 0 V, not the run.
     """
 
@@ -29,6 +30,7 @@ class OutputState:
     at: float
     monitor: float | None = None
     by_guardian: bool = False
+    tolerance: float | None = None
 
     @property
     def confirmed(self) -> bool:
@@ -44,12 +46,19 @@ class OutputState:
     def sentence(self) -> str:
         """What is known, with the time of day, and what to do where that is not 0 V."""
         if self.known is Known.CONFIRMED:
-            if self.by_guardian:
-                return f"0 V set by the guardian, confirmed by the monitor at {self.time}"
-            return f"0 V confirmed by the monitor at {self.time}"
+            by = "set by the guardian, confirmed" if self.by_guardian else "confirmed"
+            return f"0 V {by} by the monitor at {self.time}{self._within}"
         if self.known is Known.COMMANDED:
             return f"0 V commanded at {self.time}, not confirmed"
         if self.monitor is not None:
             kilovolts = round(self.monitor * 1e-3, 2) + 0.0  # no -0.00
             return f"the monitor read {kilovolts:.2f} kV at {self.time}: switch the amplifier off"
         return f"unknown since {self.time}: switch the amplifier off"
+
+    @property
+    def _within(self) -> str:
+        """What was read, and what counts as 0 V, for the end of a sentence."""
+        if self.monitor is None or self.tolerance is None:
+            return ""
+        kilovolts = round(self.monitor * 1e-3, 2) + 0.0  # no -0.00
+        return f" ({kilovolts:.2f} kV, within {self.tolerance * 1e-3:g} kV of 0)"

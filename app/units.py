@@ -17,6 +17,7 @@ _KEY_UNITS = MappingProxyType({
     "g": "g", "J": "J", "MB": "MB", "ppm": "ppm", "celsius": "°C",
     "kPa": "kPa", "pct": "%",
 })  # fmt: skip
+_UNCERTAINTY = "_uncertainty"
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,16 @@ def readable(text: str) -> str:
 
 
 def name_and_unit(key: str) -> tuple[str, str]:
-    """Return the name and the unit in a key of a file: ``rest_length_mm`` is rest length in mm."""
+    """Return the name and the unit in a key of a file: ``rest_length_mm`` is rest length in mm.
+
+    A key that is a unit alone, as ``mm_per_V``, is a scale. A standard uncertainty has the unit of
+    its quantity: ``length_mm_uncertainty`` is length uncertainty in mm.
+    """
+    stem = key.removesuffix(_UNCERTAINTY)
+    of = " uncertainty" if stem != key else ""
+    if stem in _KEY_UNITS and "_" in stem:
+        return f"scale{of}", _KEY_UNITS[stem]
     for ending in sorted(_KEY_UNITS, key=len, reverse=True):
-        if key.endswith(f"_{ending}"):
-            return key.removesuffix(f"_{ending}").replace("_", " "), _KEY_UNITS[ending]
+        if stem.endswith(f"_{ending}") and stem != "unit_per_V":  # the unit is another key's
+            return stem.removesuffix(f"_{ending}").replace("_", " ") + of, _KEY_UNITS[ending]
     return key.replace("_", " "), ""

@@ -19,6 +19,7 @@ from dearig.drivers.daqmx.watchdog import WATCHDOG
 from dearig.drivers.errors import AddressError, LinkRefused
 from dearig.drivers.instruments.findings import Finding
 from dearig.errors import InputError, InstrumentFault
+from dearig.output_state import Known, OutputState
 from dearig.sim_backend.faults import FaultPlan
 
 __all__ = ["CheckOutcome", "check_json", "check_rig", "check_table"]
@@ -26,11 +27,25 @@ __all__ = ["CheckOutcome", "check_json", "check_rig", "check_table"]
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """The findings on the rig at address ``rig``."""
+    """The findings on the rig at address ``rig``.
+
+    ``tolerance`` are the V within which the voltage monitor counts as 0 V.
+    """
 
     rig: str
     simulated: bool
     findings: tuple[Finding, ...]
+    tolerance: float | None = None
+
+    @property
+    def output(self) -> OutputState | None:
+        """State of the output as the voltage monitor read it; None where it was not read."""
+        readings = [finding.reading for finding in self.findings if finding.reading is not None]
+        if not readings:
+            return None
+        reading = readings[-1]
+        known = Known.CONFIRMED if reading.confirmed else Known.UNKNOWN
+        return OutputState(known, reading.at, reading.voltage, tolerance=self.tolerance)
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
@@ -88,7 +103,8 @@ def check_rig(rig: str, rig_file: RigFile, faults: FaultPlan | None = None) -> C
     except ValueError as error:  # a film without a rest state
         raise InputError(f"rig {rig!r} with this rig file: {error}") from error
     findings = (*_programs(), *instruments, *_limits(rig_file, kind.simulated))
-    return CheckOutcome(rig, kind.simulated, findings)
+    tolerance = rig_file.limits.zero_tolerance_kV * 1e3
+    return CheckOutcome(rig, kind.simulated, findings, tolerance)
 
 
 # ---------------------------------------------------------------- findings on every rig

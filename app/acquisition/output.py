@@ -26,7 +26,7 @@ class LastSamples:
 
     def __init__(self, channels: Sequence[Channel], tolerance: float) -> None:
         self._channels = {channel.name: (i, channel) for i, channel in enumerate(channels)}
-        self._tolerance = tolerance
+        self.tolerance = tolerance
         self._counts: np.ndarray | None = None  # of the newest samples
         self._at = 0.0
 
@@ -41,10 +41,10 @@ class LastSamples:
         command, monitor = self._values("voltage_command"), self._values("voltage_monitor")
         if command is None or monitor is None:
             return None
-        if np.abs(command).max() > self._tolerance:
+        if np.abs(command).max() > self.tolerance:
             return None
         voltage = float(monitor.mean())
-        return ZeroReading(voltage, self._at, abs(voltage) <= self._tolerance)
+        return ZeroReading(voltage, self._at, abs(voltage) <= self.tolerance)
 
     def _values(self, name: str) -> np.ndarray | None:
         if self._counts is None or name not in self._channels:
@@ -56,19 +56,19 @@ class LastSamples:
 def after_run(rig: Rig, last: LastSamples | None = None, *, failed: bool = False) -> OutputState:
     """Return the state of the output after ``make_safe``, which has ``failed`` or not."""
     acted = getattr(rig, "taken_over", None)
-    if failed:
-        if acted is not None and acted.confirmed:
-            return OutputState(Known.CONFIRMED, acted.at + acted.seconds, acted.monitor, True)
-        return unknown(rig)
-    reading = getattr(rig, "zero_reading", None)
+    tolerance = None if last is None else last.tolerance
+    reading = None if failed else getattr(rig, "zero_reading", None)
     if reading is None and acted is not None and acted.confirmed:
-        return OutputState(Known.CONFIRMED, acted.at + acted.seconds, acted.monitor, True)
+        at = acted.at + acted.seconds
+        return OutputState(Known.CONFIRMED, at, acted.monitor, True, tolerance)
+    if failed:
+        return unknown(rig)
     if reading is None and last is not None:
         reading = last.zero_reading()
     if reading is None:
         return OutputState(Known.COMMANDED, time.time())
     known = Known.CONFIRMED if reading.confirmed else Known.UNKNOWN
-    return OutputState(known, reading.at, reading.voltage)
+    return OutputState(known, reading.at, reading.voltage, tolerance=tolerance)
 
 
 def unknown(rig: Rig | None = None, monitor: float | None = None) -> OutputState:

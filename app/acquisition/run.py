@@ -269,6 +269,7 @@ class _Run:
         self._event_log = event_log
         self._last = last
         self.output_state = unknown()  # until it is at 0 V
+        self._unknown_since: float | None = None
         self._progress = progress
         self._clock = clock
         self._unread = 0.0  # s of samples that wait for this program
@@ -514,6 +515,11 @@ class _Run:
             raise InstrumentFault(f"{failure.__cause__}; {state.sentence}") from failure
 
     def _show_output(self, state: OutputState) -> None:
+        if state.known is Known.UNKNOWN and state.monitor is None:
+            # what is unknown has been so since it was first: one time for everything that says it
+            if self._unknown_since is None:
+                self._unknown_since = state.at
+            state = replace(state, at=self._unknown_since)
         self.output_state = self._recorder.output_state = state
         self._observer.output(state)
 

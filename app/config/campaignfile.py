@@ -35,6 +35,7 @@ from dearig.errors import InputError
 
 __all__ = [
     "EXAMPLE",
+    "PLAN_TABLE",
     "Band",
     "Campaign",
     "PlannedRun",
@@ -53,7 +54,7 @@ TEXT_MAX = 2**27
 
 #: A plan that the rig of the thesis can play.
 EXAMPLE = """\
-# A campaign: many unattended runs, one after the other. Edit it, then
+# A campaign: many unattended runs, one after the other.
 #   dearig campaign FILE.toml --rig sim --out DIR --check    (says how long it takes; plays nothing)
 #   dearig campaign FILE.toml --rig sim --out DIR
 name = "ageing"
@@ -182,6 +183,9 @@ class _File(Table):
     keep: _Keep = Field(default=_Keep(), description="which recordings are kept whole")
     notify: NotifyTable = Field(default=NotifyTable(), description="notifications")
 
+
+#: Fields of a plan's top level, for a form.
+PLAN_TABLE: type[Table] = _File
 
 _COMPARISONS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
     {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}

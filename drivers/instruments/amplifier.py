@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
 from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.settings import AmplifierSettings, RigSettings
+from dearig.drivers.zero_reading import ZeroReading
 
 __all__ = ["AmplifierDriver", "Monitors", "zero_findings"]
 
 #: Share of the current limit below which the current monitor counts as 0.
 CURRENT_AT_ZERO = 0.02
+_AT_ZERO = "voltage monitor at 0 V"
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ def zero_findings(monitors: Monitors, settings: RigSettings) -> tuple[Finding, .
     findings = []
     for item, value, most, unit, advice in (
         (
-            "voltage monitor at 0 V", kilovolts, allowed, "kV",
+            _AT_ZERO, kilovolts, allowed, "kV",
             "keep away from the film: there may be high voltage on it. Switch the amplifier's high "
             "voltage off; then check the monitor's cable, card.ai_voltage_monitor and the "
             "amplifier's zero",
@@ -69,10 +72,13 @@ def zero_findings(monitors: Monitors, settings: RigSettings) -> tuple[Finding, .
         ),
     ):  # fmt: skip
         zero = math.isfinite(value) and abs(value) < most
+        read = None
+        if item == _AT_ZERO and math.isfinite(value):
+            read = ZeroReading(monitors.voltage, time.time(), zero)
         findings.append(
             Finding(
                 name, item, f"{round(value, 3) + 0.0:.3f} {unit}", f"less than {most:g} {unit}",
-                "ok" if zero else "wrong", "" if zero else advice,
+                "ok" if zero else "wrong", "" if zero else advice, read,
             )
         )  # fmt: skip
     return tuple(findings)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from dearig.drivers.zero_reading import ZeroReading
+
 __all__ = ["Finding", "Verdict"]
 
 Verdict = Literal["ok", "warning", "wrong", "not wired"]
@@ -15,7 +17,8 @@ class Finding:
     """Finding on an ``item`` of an ``instrument``: ``found``, ``wanted``, and what to do.
 
     ``wrong`` prevents a run, ``warning`` does not. ``not wired`` marks an item that the rig file
-    does not have and that was not inspected.
+    does not have and that was not inspected. ``reading`` is that of the voltage monitor with 0 V
+    commanded, where the finding is about it.
     """
 
     instrument: str
@@ -24,6 +27,7 @@ class Finding:
     wanted: str = ""
     verdict: Verdict = "ok"
     advice: str = ""
+    reading: ZeroReading | None = None
 
     @property
     def sentence(self) -> str:

@@ -125,7 +125,9 @@ def test_a_finished_run_carries_the_reading_that_confirmed_zero_volts(
     assert state.known is Known.CONFIRMED
     assert state.monitor is not None
     assert state.monitor != 0.0  # a reading, with its noise
-    assert state.sentence == f"0 V confirmed by the monitor at {state.time}"
+    assert state.tolerance == 100.0  # V, of the limits
+    read = f"{round(state.monitor * 1e-3, 2) + 0.0:.2f} kV, within 0.1 kV of 0"
+    assert state.sentence == f"0 V confirmed by the monitor at {state.time} ({read})"
     noted = attributes(tmp_path)
     assert noted["output_state"] == "confirmed"
     assert noted["output_set_by"] == "run"
@@ -161,6 +163,9 @@ def test_a_rig_that_cannot_be_made_safe_is_unknown(run, tmp_path: Path) -> None:
     assert ended.output_state.known is Known.UNKNOWN
     assert "switch the amplifier off" in ended.output_state.sentence
     assert [state.known for state in states] == [Known.UNKNOWN] * 2
+    # unknown since one moment, whatever tells it
+    assert {state.at for state in states} == {ended.output_state.at}
+    assert f"fault: output: {ended.output_state.sentence}" in messages(tmp_path)
     assert attributes(tmp_path)["output_state"] == "unknown"
     assert "COULD NOT BE TAKEN TO 0 V" in messages(tmp_path)
 
@@ -173,7 +178,7 @@ def test_a_guardian_that_succeeds_later_is_told_and_recorded(
     assert isinstance(ended, InstrumentFault)
     # it was unknown until the guardian reported
     assert [state.known for state in states[:2]] == [Known.UNKNOWN, Known.CONFIRMED]
-    assert states[1] == OutputState(Known.CONFIRMED, 1e9 + 8.0, 1.5, by_guardian=True)
+    assert states[1] == OutputState(Known.CONFIRMED, 1e9 + 8.0, 1.5, True, 100.0)
     noted = attributes(tmp_path)
     assert (noted["output_state"], noted["output_set_by"]) == ("confirmed", "guardian")
     assert acted.sentence in messages(tmp_path)

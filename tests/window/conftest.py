@@ -16,6 +16,7 @@ from PySide6.QtCore import (
     QEvent,
     QMessageLogContext,
     QSettings,
+    Qt,
     QtMsgType,
     qInstallMessageHandler,
 )
@@ -25,13 +26,18 @@ from pytestqt.qtbot import QtBot
 from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import LimitsSettings
 from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.run.controls import StepButton
 from dearig.window.run.page import RunPage
 from dearig.window.sequence.planner import Planner
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 
-# the offscreen platform says this of every window that it shows, and means nothing by it
-_ALLOWED = ("This plugin does not support propagateSizeHints()",)
+# the offscreen platform says this of windows that it shows, and means nothing by it
+_ALLOWED = (
+    "This plugin does not support propagateSizeHints()",
+    "This plugin does not support raise()",
+    "This plugin does not support grabbing the keyboard",
+)
 
 SHORT = """\
 name = "one lobe"
@@ -86,6 +92,12 @@ def _no_word_from_qt() -> Iterator[None]:
     yield
     qInstallMessageHandler(before)
     assert said == []
+
+
+def press(qtbot: QtBot, step: StepButton) -> None:
+    """Click a step towards voltage as an operator does: once it can be, and is seen to be."""
+    qtbot.waitUntil(lambda: step.isEnabled() and step.answers, timeout=120_000)
+    qtbot.mouseClick(step, Qt.MouseButton.LeftButton)
 
 
 class Answers:

@@ -138,9 +138,9 @@ def play(folder: Path, port: int, picture: str) -> None:
         first = False
         if page.queue.halted:
             write(controls.seen, "fine")
-        until(controls.arm.isEnabled, "the batch can be armed")
+        until(lambda: controls.arm.isEnabled() and controls.arm.answers, "the batch can be armed")
         click(controls.arm)
-        until(controls.start.isEnabled, "armed")
+        until(lambda: controls.start.isEnabled() and controls.start.answers, "ARMED was seen")
         click(controls.start)
         until(lambda: window.run_page.runner.running, "started")
         print(json.dumps({"at": "started"}), flush=True)

@@ -116,7 +116,7 @@ def main() -> None:
         hand.click(widget.mapToGlobal(widget.rect().center()))
 
     until(window.isActiveWindow, "the window becomes active")
-    until(lambda: page.arm_button.isEnabled(), "a plan")
+    until(lambda: page.arm_button.isEnabled() and page.arm_button.answers, "a plan")
     item = window.list.visualItemRect(window.list.item(1)).center()
     hand.click(window.list.viewport().mapToGlobal(item))
     until(window.sequence_page.isVisible, "the page of the sequence")
@@ -158,6 +158,7 @@ def main() -> None:
     saw["ended"] = window.bar.badge.state.name
     saw["result"] = page.result.text()
     # and once more, stopped with the mouse
+    until(lambda: page.arm_button.isEnabled() and page.arm_button.answers, "a plan again")
     click(page.arm_button)
     until(page.start_button.isEnabled, "armed again")
     click(page.start_button)

@@ -76,13 +76,16 @@ class Story:
 
     def arm(self) -> None:
         self.window.show_page(self.page)
-        until(self.page.arm_button.isEnabled, "a plan")
-        self.click(self.page.arm_button)
+        arm = self.page.arm_button
+        until(lambda: arm.isEnabled() and arm.answers, "a plan")
+        self.click(arm)
         until(lambda: self.runner.armed, "armed")
 
     def start(self) -> None:
         self.arm()
-        self.click(self.page.start_button)
+        start = self.page.start_button
+        until(lambda: start.isEnabled() and start.answers, "ARMED was seen")
+        self.click(start)
         until(lambda: self.seconds() > 0.0, "started")
 
     def seconds(self) -> float:

@@ -35,7 +35,8 @@ from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
 from tests.window.real_window import end
 
-SIZES = ((1366, 768), (1920, 1080))
+#: A small notebook, a large screen, and the small one at a scale of 1.5 without a window's frame.
+SIZES = ((1366, 768), (1920, 1080), (911, 484))
 LOOKS = ("light", "dark")
 #: It leaks, which the thesis's run alone cannot tell from a permittivity: so there is something to
 #: propose.
@@ -134,6 +135,7 @@ def views(window: MainWindow) -> Iterator[str]:
     run.paced.setChecked(True)
     run.arm_button.click()
     yield "run-armed"
+    until(run.start_button.isEnabled, "the state ARMED to be seen")
     run.start_button.click()
     until(lambda: run.live is not None and far(run, 9.0), "the run")
     yield "run-going"
@@ -197,6 +199,7 @@ def following(window: MainWindow) -> Iterator[str]:
         follow.run_button.click()
         until(run.arm_button.isEnabled, "the plan of a run")
         run.arm_button.click()
+        until(run.start_button.isEnabled, "the state ARMED to be seen")
         run.start_button.click()
         until(lambda: not run.runner.running, "the end of a run")
         until(follow.compute_button.isEnabled, "what is learned")
@@ -227,6 +230,7 @@ def holding(window: MainWindow) -> Iterator[str]:
     until(run.arm_button.isEnabled, "the plan of a run")
     run.paced.setChecked(True)
     run.arm_button.click()
+    until(run.start_button.isEnabled, "the state ARMED to be seen")
     run.start_button.click()
     until(lambda: far(run, 20.0), "a hold")
     yield "hold-run"
@@ -256,6 +260,7 @@ def campaigning(window: MainWindow) -> Iterator[str]:
     page.controls.paced.setChecked(True)
     page.controls.arm.click()
     yield "campaign-armed"
+    until(page.controls.start.isEnabled, "the state ARMED to be seen")
     page.controls.start.click()
 
     def playing(run: int, seconds: float) -> bool:

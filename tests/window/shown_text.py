@@ -6,29 +6,36 @@ import re
 from collections.abc import Iterator
 
 from PySide6 import QtGui
-from PySide6.QtCore import QAbstractListModel, QRect, Qt
+from PySide6.QtCore import QAbstractListModel, QPoint, QRect, Qt
 from PySide6.QtGui import QFontMetrics, QTextDocument
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
+    QAbstractSpinBox,
     QComboBox,
     QGraphicsTextItem,
     QGraphicsView,
     QGroupBox,
     QHeaderView,
     QLabel,
+    QLineEdit,
     QMenu,
+    QProgressBar,
     QTabBar,
     QTableView,
     QToolButton,
     QWidget,
 )
 
-__all__ = ["cut_off", "rendered_markup", "shown_texts", "unreadable"]
+__all__ = ["commands", "cut_off", "overlapping", "rendered_markup", "shown_texts", "unreadable"]
 
 #: Names of keys with their units, which are for files, and signs that stand in for others.
 _RAW = re.compile(
     r"\b[A-Za-z]\w*_(?:kV|V|mA|kHz|Hz|s|ms|mm|um|g|kPa|kg|MB|pct)\b|\+-|(?<=\d) u[sm]\b"
+)
+#: What belongs to a terminal: options, and names of commands behind that of the program.
+_COMMAND = re.compile(
+    r"(?<![\w-])--[a-z][a-z-]+|\bdearig [a-z]+(?:-[a-z]+)*\b|\bctrl-C\b|\bexit code\b"
 )
 _ROWS = 400  # rows of a table that are looked at
 
@@ -111,6 +118,44 @@ def unreadable(window: QWidget) -> list[str]:
             if _RAW.search(text)
         }
     )
+
+
+def commands(window: QWidget) -> list[str]:
+    """Return the shown texts that name a command, its option, or a key of a terminal."""
+    return sorted(
+        {
+            f"{type(widget).__name__}: {text!r}"
+            for widget, text in shown_texts(window)
+            if _COMMAND.search(text)
+        }
+    )
+
+
+def overlapping(window: QWidget) -> list[str]:
+    """Return the pairs of labels, buttons and fields that cover a part of each other."""
+    kinds = (QLabel, QAbstractButton, QLineEdit, QComboBox, QAbstractSpinBox, QProgressBar)
+    placed: list[tuple[QWidget, QRect]] = []
+    for widget in window.findChildren(QWidget):
+        if not isinstance(widget, kinds) or not widget.isVisible() or widget.window() is not window:
+            continue
+        if isinstance(widget, QLabel) and not widget.text().strip():
+            continue
+        seen = widget.visibleRegion().boundingRect()
+        if seen.isEmpty() or any(parent.isAncestorOf(widget) for parent, _ in placed):
+            continue  # a field of another one
+        placed.append((widget, seen.translated(widget.mapTo(window, QPoint(0, 0)))))
+    found = []
+    for i, (one, at) in enumerate(placed):
+        for other, there in placed[:i]:
+            common = at.intersected(there)
+            if min(common.width(), common.height()) > 1 and not one.isAncestorOf(other):
+                found.append(f"{_named(one)} over {_named(other)}")
+    return found
+
+
+def _named(widget: QWidget) -> str:
+    text = widget.text() if isinstance(widget, QLabel | QAbstractButton) else ""
+    return f"{type(widget).__name__} {text or widget.toolTip()!r}"
 
 
 def cut_off(window: QWidget) -> list[str]:

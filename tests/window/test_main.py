@@ -87,9 +87,10 @@ def show(self):
     page, timer = self.run_page, QTimer(self)
     def look():
         if page.live is None:
-            if page.arm_button.isEnabled():
+            if page.runner.armed:
+                page.start_button.click()  # once ARMED was seen
+            elif page.arm_button.isEnabled():
                 page.arm_button.click()
-                page.start_button.click()
         elif (now := page.live.now()) is not None and now.samples > 2500:
             timer.stop()
             signal.raise_signal(signal.SIGTERM)

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from dearig.batch.campaign import Arming
 from dearig.config.campaignfile import RUNS_MAX
+from dearig.window.high_voltage.status import HighVoltageStatus
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, Readout, button, card, label
 from dearig.window.run.controls import StepButton
@@ -42,8 +43,9 @@ class CampaignControls(QWidget):
     changed = Signal()
     operator_changed = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, status: HighVoltageStatus, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._status = status
         self._left = 0  # runs that wait
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -95,19 +97,18 @@ class CampaignControls(QWidget):
         if not reason:
             self.seen.clear()
 
-    def show_numbers(self, now: RunSnapshot | None, running: bool) -> None:
-        """Show the newest samples of the present run, or in grey those of the last one."""
+    def show_numbers(self, now: RunSnapshot | None) -> None:
+        """Show the newest samples of the present run; no numbers where None is given."""
         for name, readout in self.numbers.items():
             value = math.nan if now is None else now.values.get(name, math.nan)
             readout.show_number(value * (1e-3 if name == "monitor" else 1e3), 3)
-            readout.show_past(not running)
         if now is None:
             self.progress.setValue(0)
             self.time_left.setText("")
             return
         self.progress.setValue(round(1000 * now.samples / max(now.total, 1)))
         left = max(0.0, (now.total - now.samples) / now.rate)
-        self.time_left.setText(f"{left:.1f} s left" if running else "")
+        self.time_left.setText(f"{left:.1f} s left")
 
     # layout
 
@@ -147,9 +148,9 @@ class CampaignControls(QWidget):
             row.addWidget(caption)
             row.addWidget(field, share)
         row.addWidget(self.paced)
-        self.arm = StepButton("1  Arm", "First step: no voltage yet", "F5", self)
+        self.arm = StepButton("1  Arm", "First step: no voltage yet", "F5", self, self._status)
         self.arm.setCheckable(True)
-        self.start = StepButton("2  Start", "Second step: play the batch", "F6", self)
+        self.start = StepButton("2  Start", "Second step: play the batch", "F6", self, self._status)
         for step in (self.arm, self.start):
             step.setMinimumSize(_STEP_WIDTH, 36)
             row.addWidget(step)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from PySide6.QtCore import Qt, QTimer, Slot
+from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
@@ -19,11 +19,9 @@ from dearig.acquisition.rigs import is_simulated
 from dearig.acquisition.run import RunOptions
 from dearig.batch.ask import ask
 from dearig.batch.queue import DONE, WAITING, Queue
-from dearig.batch.watching import seen
 from dearig.errors import InputError
-from dearig.progress import Progress, quiet
 from dearig.recording.result_folder import numbered_folder
-from dearig.report.pages.campaign import duration_text, write_campaign_report
+from dearig.report.pages.campaign import duration_text
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.campaign.controls import CampaignControls
 from dearig.window.campaign.plan import (
@@ -34,19 +32,21 @@ from dearig.window.campaign.plan import (
     SurveyRequest,
     open_campaign,
     with_requests,
+    write_report,
 )
+from dearig.window.campaign.present_run import PresentRun
 from dearig.window.campaign.table import CampaignTable, QueueRows, rows_of_plan
 from dearig.window.campaign.texts import arming_block, counted, crash_text, plan_text, runs_text
 from dearig.window.campaign.thread import CampaignRequest, CampaignThread
 from dearig.window.documents import dialogs
 from dearig.window.high_voltage.state import HighVoltage
-from dearig.window.high_voltage.status import Reading
 from dearig.window.jobs.background import Background
 from dearig.window.jobs.job_controls import result_side, splitter
 from dearig.window.jobs.worker import Worker
 from dearig.window.kit.browser import open_in_browser
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label
+from dearig.window.run.live import Live
 from dearig.window.run.page import RunPage
 from dearig.window.run.runner import Play, RunEnd, Runner
 from dearig.window.session.layout_state import remember
@@ -57,7 +57,6 @@ from dearig.window.session.text_file import TextFile
 __all__ = ["CampaignPage"]
 
 _LEFT = 330  # px, default width of the left column
-_NUMBERS = 100  # ms between two updates of the readouts
 _BLOCK = "campaign"  # of the session
 #: Entries of the journal after which a campaign may be between two runs.
 _BETWEEN = ("recorded", "ended", "not-started", "request")
@@ -72,6 +71,7 @@ class CampaignPage(Page):
     title = "Campaign"
     at_start = True
     edits = "plan"
+    watch_run = Signal(object, str)  #: what looks on at a run that has begun, and its name
 
     def __init__(self, session: Session, runner: Runner, parent: QWidget | None = None) -> None:
         super().__init__(session, parent)
@@ -104,15 +104,16 @@ class CampaignPage(Page):
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.addWidget(self.split)
-        self._numbers = QTimer(self, interval=_NUMBERS)
-        self._numbers.timeout.connect(self._update_numbers)
         self._connect()
         self._refresh()
 
     @classmethod
     def make(cls, session: Session, pages: Pages) -> Self:
-        """Return the page; it plays with the runner of the page Run."""
-        return cls(session, pages.page(RunPage).runner)
+        """Return the page; it plays with the runner of the page Run, which shows its runs."""
+        run = pages.page(RunPage)
+        page = cls(session, run.runner)
+        page.watch_run.connect(run.watch)
+        return page
 
     def restore(self, text: str, file: TextFile) -> None:
         """Replace the plan by the unsaved one of an earlier window."""
@@ -168,8 +169,9 @@ class CampaignPage(Page):
             CampaignRequest(
                 found.campaign, session.address, session.rig_file, folder, options, arming, resume
             ),
-            self._runner,
-        )
+            session.overlays, session.overlay_drive, self._runner,
+        )  # fmt: skip
+        thread.began.connect(self._run_began)
         thread.noted.connect(self._noted)
         thread.stage.connect(self._show_stage)
         if not self._runner.begin(thread, Play.CAMPAIGN):
@@ -180,7 +182,7 @@ class CampaignPage(Page):
         self._runner.status.set_between(_PLANNED)
         session.block(_BLOCK, "a campaign goes on: see the page Campaign")
         session.set_running(True)
-        self._numbers.start()
+        self.present_run.begin()
         self._refresh()
 
     def wish(self, *requests: tuple[str, str]) -> None:
@@ -201,7 +203,7 @@ class CampaignPage(Page):
 
     def close_work(self) -> None:
         """End all threads and processes; the runner is at rest."""
-        self._numbers.stop()
+        self.present_run.end()
         self.surveyor.close()
         self._opening.close()
         self._worker.close()
@@ -291,6 +293,13 @@ class CampaignPage(Page):
         )
         self._show_queue()
 
+    @Slot(object)
+    def _run_began(self, live: Live) -> None:
+        """Show a run that has begun, here and on the page Run."""
+        run = self._queue.running
+        self.present_run.follow(live)
+        self.watch_run.emit(live, "a run of the campaign" if run is None else run.name)
+
     @Slot(object, bool)
     def _noted(self, entries: Sequence[Mapping[str, Any]], older: bool) -> None:
         """Take entries of the journal; the ``older`` ones are of earlier sessions."""
@@ -342,28 +351,19 @@ class CampaignPage(Page):
         run, stage = self._queue.running, self._stage
         if self._thread is None:
             self.controls.present.setText("")
+        elif run is not None and self._runner.status.state is HighVoltage.UNKNOWN:
+            self.controls.present.setText(f"{run.name} · the output is unknown, the run is ending")
         elif run is not None:
             self.controls.present.setText(f"{run.name} · {stage.partition(', ')[2] or stage}")
         else:
             self.controls.present.setText(stage[:1].upper() + stage[1:])
-
-    @Slot()
-    def _update_numbers(self) -> None:
-        thread = self._thread
-        now = None if thread is None or thread.live is None else thread.live.now()
-        status = self._runner.status
-        self.controls.show_numbers(now, status.live)
-        if now is not None:
-            monitor = now.values.get("monitor", float("nan"))
-            status.show_reading(Reading(monitor, now.samples / now.rate, now.total / now.rate))
 
     @Slot(object)
     def _ended(self, end: RunEnd) -> None:
         thread, folder = self._thread, self._folder
         if end.play is not Play.CAMPAIGN or thread is None or folder is None:
             return
-        self._update_numbers()
-        self._numbers.stop()
+        self.present_run.end()
         self._thread, self._stage = None, ""
         if not self._queue.runs:  # nothing was begun
             with contextlib.suppress(OSError):
@@ -379,7 +379,7 @@ class CampaignPage(Page):
         if self._folder is not None and self._queue.runs:
             self._fix_plan()
             self._show_queue()
-        self.controls.show_numbers(None if thread.live is None else thread.live.now(), False)
+        self.controls.show_numbers(None)
         self._show_present()
         last = [run for run in self._queue.listed if run.state == DONE and run.recording]
         if last and self._folder is not None:
@@ -441,7 +441,7 @@ class CampaignPage(Page):
         self.summary.show_text("")
         self.message.show_text("")
         self.controls.forget_proposal()
-        self.controls.show_numbers(None, False)
+        self.controls.show_numbers(None)
         self.plan.restore(toml, TextFile("plan", toml, None, survey_folder))
 
     @Slot()
@@ -455,7 +455,7 @@ class CampaignPage(Page):
     @Slot()
     def _report(self) -> None:
         if self._folder is not None:
-            job = self._worker.submit(_write_report, self._folder)
+            job = self._worker.submit(write_report, self._folder)
             job.finished.connect(self._report_written)
             job.failed.connect(self._fail)
             self._job = job
@@ -506,7 +506,7 @@ class CampaignPage(Page):
             return  # the change of the state comes here again
         controls.arm.setEnabled(ready and armed == runner.armed)
         controls.arm.setChecked(armed)
-        controls.start.setEnabled(ready and armed)
+        controls.start.setEnabled(ready and armed and runner.status.may_start)
         controls.set_editable(not session.running)
         controls.paced.setVisible(is_simulated(session.address))
         controls.show_halt("" if running else self._queue.halted)
@@ -544,6 +544,10 @@ class CampaignPage(Page):
         controls.operator.setText(session.operator)
         controls.arm.clicked.connect(self._arm)
         controls.start.clicked.connect(self.start)
+        for step in (controls.arm, controls.start):
+            step.dropped.connect(session.message)
+        self._runner.status.start_opened.connect(self._refresh)
+        self._runner.status.changed.connect(self._show_present)
         controls.pause.clicked.connect(lambda: self.wish(("pause", "")))
         controls.go_on.clicked.connect(lambda: self.wish(("continue", "")))
         controls.end.clicked.connect(lambda: self.wish(("end", "")))
@@ -579,14 +583,11 @@ class CampaignPage(Page):
         self.summary = Message()
         self.message = Message()
         self.table = CampaignTable(self._session)
-        self.controls = CampaignControls()
+        self.controls = CampaignControls(self._runner.status)
+        self.present_run = PresentRun(self._session, self._runner.status, self.controls)
         return result_side(
             self.headline, (self.open_button, self.new_button, self.report_button),
-            (self.summary, self.message), self.table, self.controls,
+            (self.summary, self.message),
+            splitter(Qt.Orientation.Vertical, self.table, self.present_run, growing=0),
+            self.controls,
         )  # fmt: skip
-
-
-def _write_report(folder: Path, progress: Progress = quiet) -> Path:
-    """Write the report of the campaign in ``folder`` beside its journal."""
-    progress("writing the report", 0.0)
-    return write_campaign_report(seen(folder), folder / "report.html")

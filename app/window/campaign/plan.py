@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from PySide6.QtCore import QTimer, Signal, Slot
-from PySide6.QtWidgets import QPlainTextEdit, QWidget
+from PySide6.QtGui import QTextCursor
+from PySide6.QtWidgets import QPlainTextEdit, QTabWidget, QWidget
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.batch.forecast import Forecast, survey
@@ -17,7 +18,9 @@ from dearig.config.campaignfile import EXAMPLE, Campaign, parse_campaign
 from dearig.config.rigfile import RigFile
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError, Interrupted
-from dearig.progress import Progress
+from dearig.progress import Progress, quiet
+from dearig.report.pages.campaign import write_campaign_report
+from dearig.window.campaign.plan_form import PlanForm
 from dearig.window.documents.toml_editor import EditorWords, TomlEditor
 from dearig.window.jobs.background import Background
 from dearig.window.session.state import Session
@@ -29,6 +32,7 @@ __all__ = [
     "Surveyor",
     "open_campaign",
     "with_requests",
+    "write_report",
 ]
 
 _WAIT = 400  # ms after a change of the text, before it is surveyed
@@ -43,17 +47,39 @@ _WORDS = EditorWords(
 
 
 class PlanEditor(TomlEditor):
-    """Text of a plan file."""
+    """Plan as a form, and the text of its file, which both edit."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(session, _WORDS, EXAMPLE, parent)
         self.edit.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.form = PlanForm()
+        self.tabs = QTabWidget()
+        column = self.layout()
+        if column is not None:
+            column.replaceWidget(self.edit, self.tabs)
+        self.tabs.addTab(self.form, "Form")
+        self.tabs.addTab(self.edit, "Text")
+        self.form.changed.connect(self._form_changed)
+        self.changed.connect(self._show_form)
+        self._show_form()
 
     def set_fixed(self, fixed: bool) -> None:
-        """Make the text that of a campaign that was begun: it can be read and saved only."""
+        """Make the plan that of a campaign that was begun: it can be read and saved only."""
         self.edit.setReadOnly(fixed)
+        self.form.setEnabled(not fixed)
         self.open_button.setEnabled(not fixed)
         self.example_button.setEnabled(not fixed)
+
+    @Slot(str)
+    def _form_changed(self, toml: str) -> None:
+        """Take the text of the form as one step that can be undone."""
+        cursor = QTextCursor(self.edit.document())
+        cursor.select(QTextCursor.SelectionType.Document)
+        cursor.insertText(toml)
+
+    @Slot()
+    def _show_form(self) -> None:
+        self.form.show_plan(self.toml, self.folder)
 
 
 @dataclass(frozen=True)
@@ -104,6 +130,12 @@ class OpenedCampaign:
     reason: str
 
 
+def write_report(folder: Path, progress: Progress = quiet) -> Path:
+    """Write the report of the campaign in ``folder`` beside its journal."""
+    progress("writing the report", 0.0)
+    return write_campaign_report(seen(folder), folder / "report.html")
+
+
 def open_campaign(folder: Path) -> OpenedCampaign:
     """Read the campaign in ``folder``.
 
@@ -112,7 +144,8 @@ def open_campaign(folder: Path) -> OpenedCampaign:
     outcome = seen(folder)
     if outcome.status in ("running", "paused"):
         raise InputError(
-            f"the campaign in {folder} is played by another process; dearig watch {folder} shows it"
+            f"the campaign in {folder} is played by another program; it can be continued here once "
+            f"that has ended"
         )
     queue = outcome.queue
     toml = read_text(folder / "plan.toml", "plan")

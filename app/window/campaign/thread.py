@@ -10,6 +10,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
+from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.plan import Plan
 from dearig.acquisition.run import RunObserver, RunOptions
 from dearig.batch.campaign import Arming, play_campaign
@@ -58,10 +59,15 @@ class CampaignThread(PlayThread):
 
     noted = Signal(object, bool)
     stage = Signal(str)
+    began = Signal(object)  #: what looks on at a run that has begun
 
-    def __init__(self, request: CampaignRequest, parent: QObject) -> None:
+    def __init__(
+        self, request: CampaignRequest, overlays: tuple[OverlayModel, ...], drive: str,
+        parent: QObject,
+    ) -> None:  # fmt: skip
         super().__init__(parent)
         self._request = request
+        self._overlays, self._drive = overlays, drive
         self._told = False
         self._stage = ""
         self.live: Live | None = None
@@ -105,6 +111,11 @@ class CampaignThread(PlayThread):
         self._looking = live
         if live is not None:
             self.live = live
+            self.began.emit(live)
+
+    def new_live(self) -> Live:
+        """Return what looks on at the next run, with the overlay models of the page Run."""
+        return Live(self._overlays, self._drive)
 
     def _note(self, entries: Sequence[Mapping[str, Any]]) -> None:
         if self._told and entries[-1]["event"] == "started":
@@ -147,7 +158,7 @@ class LiveObserver(RunObserver):
         self._thread = thread
 
     def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
-        live = Live()
+        live = self._thread.new_live()
         live.started(planned, identity, rate)
         self._thread.follow(live)
 

@@ -46,6 +46,9 @@ class TomlEditor(QWidget):
         super().__init__(parent)
         self.session = session
         self.words = words
+        # its lines for a terminal have no place in a window
+        lines = example.splitlines(keepends=True)
+        example = "".join(line for line in lines if not line.lstrip("# ").startswith("dearig "))
         self._text_of_example = example
         self._file = TextFile(words.what, example)
         self.trouble = Message()

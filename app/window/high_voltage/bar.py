@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtGui import QFont, QFontMetrics
 from PySide6.QtWidgets import (
@@ -30,6 +32,7 @@ __all__ = ["HighVoltageBar", "label_stop", "stop_button"]
 _STOP = "⬣  STOP"
 _STOP_AGAIN = "⬣  0 V NOW"
 _HEIGHT = 44  # px
+_NOTICES = 28  # px of the line below it, for the alarm and the notices
 _WORDS = 200  # px of the sentence on the state, in two or three lines
 
 
@@ -93,7 +96,7 @@ class HighVoltageBar(QFrame):
             QFontMetrics(self.monitor.font()).horizontalAdvance("-10.00 kV")
         )
         self.monitor.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.time = label("", "muted", "Time in the sequence, of its whole length")
+        self.time = label("", "muted", "Time in the sequence, or when the monitor was read")
         self.detail = label("")
         self.detail.setWordWrap(True)  # "switch the amplifier off" must not be cut
         self.detail.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
@@ -111,20 +114,29 @@ class HighVoltageBar(QFrame):
         row.addWidget(self.time)
         row.addWidget(self.detail, 1)
         row.addWidget(self.stop_button)
-        latched = QHBoxLayout()
-        latched.setSpacing(SPACE)
-        latched.addWidget(self.alarm, 1)
-        latched.addWidget(self.acknowledge_button)
+        # of one height, whether it shows something or not: what comes and goes must not move STOP
+        notices = QWidget()
+        notices.setFixedHeight(_NOTICES)
+        self._notices = QHBoxLayout(notices)
+        self._notices.setContentsMargins(0, 0, 0, 0)
+        self._notices.setSpacing(SPACE)
+        self._notices.addWidget(self.alarm, 1)
+        self._notices.addWidget(self.acknowledge_button)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(SPACE, SPACE // 2, SPACE, SPACE // 2)
         rows.setSpacing(SPACE // 2)
         rows.addLayout(row)
-        rows.addLayout(latched)
+        rows.addWidget(notices)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.badge.painted.connect(status.painted)
         self.stop_button.pressed.connect(self.stop_pressed)
         self.acknowledge_button.clicked.connect(self._ask_name)
         status.changed.connect(self._refresh)
         self._refresh()
+
+    def add_notices(self, notices: QWidget) -> None:
+        """Put ``notices`` into the line of the alarm, behind it."""
+        self._notices.addWidget(notices, 1)
 
     def acknowledge(self, name: str) -> None:
         """Release the alarm in the ``name`` of a person, in the log and in the recording."""
@@ -143,18 +155,13 @@ class HighVoltageBar(QFrame):
     @Slot()
     def _refresh(self) -> None:
         status = self._status
-        self.badge.show_state(status.state, status.detail)
+        self.badge.show_state(status.state, status.brief)
         self.detail.setText(status.words)
         self.detail.setToolTip(plain_tip(status.words))
         label_stop(self.stop_button, status.state)
-        reading = status.reading
-        if reading is None:
-            self.monitor.setText("— kV")
-            self.time.setText("")
-        else:
-            self.monitor.setText(kilovolts(reading.monitor))
-            of = f"{reading.seconds:.1f} of {reading.total:.1f} s"
-            self.time.setText(of if status.live else f"last sample,\n{reading.seconds:.2f} s")
+        volts, belongs_to = status.number
+        self.monitor.setText("— kV" if math.isnan(volts) else kilovolts(volts))
+        self.time.setText(belongs_to)
         set_role(self.monitor, "" if status.live else "muted")
         alarm = status.alarm
         self.alarm.setVisible(alarm is not None)

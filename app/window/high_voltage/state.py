@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -39,8 +39,8 @@ EXPLAINED = {
     "that. Switch the amplifier's high voltage off by hand before you touch the film.",
     HighVoltage.UNKNOWN: "There may be high voltage. Switch the amplifier's high voltage off by "
     "hand.",
-    HighVoltage.ARMED: "Start (F6) begins the run; Esc or Space disarms. Keep away from the "
-    "electrodes.",
+    HighVoltage.ARMED: "Start (F6) begins the run; Esc or Space disarms, outside text fields. "
+    "Keep away from the electrodes.",
     HighVoltage.BETWEEN: "The output is at 0 V. The campaign starts its next run by itself, unless "
     "it is paused. Esc, Space or STOP ends the campaign. Keep away from the electrodes.",
     HighVoltage.ON: "A sequence is playing. The electrodes may carry 8 kV and more. Esc or Space "
@@ -79,7 +79,12 @@ def kilovolts(volts: float, decimals: int = 2) -> str:
 
 
 class HighVoltageBadge(QWidget):
-    """Shows a ``HighVoltage`` with its shape, and in the ``large`` one a line of detail."""
+    """Shows a ``HighVoltage`` with its shape, and in the ``large`` one a line of detail.
+
+    ``painted`` carries the state whenever it has been drawn.
+    """
+
+    painted = Signal(object)
 
     def __init__(self, large: bool, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -133,6 +138,7 @@ class HighVoltageBadge(QWidget):
         else:
             self._write(painter, words, self._state.value, 0.42 * area.height())
         painter.end()
+        self.painted.emit(self._state)
 
     def _write(self, painter: QPainter, place: QRectF, text: str, pixels: float) -> None:
         """Write ``text`` in bold letters ``pixels`` high, or in two lines of smaller ones."""

@@ -5,17 +5,22 @@ There is one ``HighVoltageStatus``; the bar of the main window and the Run page 
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import json
 import logging
+import math
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, Signal, Slot
+from PySide6.QtCore import QLockFile, QObject, Qt, QTimer, Signal, Slot
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.output_state import Known, OutputState
+from dearig.window.high_voltage.responsiveness import REACTION, Responsiveness
 from dearig.window.high_voltage.state import HighVoltage, kilovolts, state_at_rest
+from dearig.window.session.recovery import lock_of, unsaved_folder
 from dearig.window.session.settings import kept_text
 from dearig.window.session.state import Session
 
@@ -46,8 +51,17 @@ class LatchedAlarm:
 
     @property
     def text(self) -> str:
-        """The alarm in one sentence, with its time of day."""
-        return f"{self.headline} at {_clock(self.at)}: {self.sentence}"
+        """The alarm in one sentence, with its time of day and the rig where that is real."""
+        return f"{self.headline}{self._where} at {_clock(self.at)}: {self.sentence}"
+
+    @property
+    def summary(self) -> str:
+        """The headline with rig and time of day."""
+        return f"{self.headline}{self._where} at {_clock(self.at)}"
+
+    @property
+    def _where(self) -> str:
+        return "" if is_simulated(self.address) else f" on {self.address}"
 
 
 @dataclass(frozen=True)
@@ -62,15 +76,20 @@ class Reading:
 class HighVoltageStatus(QObject):
     """What is known of the high voltage; ``changed`` comes with everything that is shown.
 
-    ``output`` is what was measured after the last run on the rig of the session, None where this
-    program has not contacted that rig. A latched ``alarm`` blocks arming. It is kept in the
-    settings for a rig that is not simulated, so that another start of the program shows it again.
-    ``disarm_due`` comes when the time to start an armed rig is over.
+    ``output`` is what was measured after the last run on the rig of the session, or by a check of
+    it; None where this program has not contacted that rig. ``reading`` belongs to the rig and to
+    the run ``run_number``: both change with each run that begins, and with the rig. A latched
+    ``alarm`` blocks arming. It is kept in the settings for a rig that is not simulated, so that
+    another start of the program shows it again.
+    ``disarm_due`` comes when the time to start an armed rig is over. An armed rig can be started
+    once the state ARMED has been on the screen for twice the time of a reaction, which
+    ``start_opened`` tells: ``may_start``.
     """
 
     changed = Signal()
     state_changed = Signal(object)
     disarm_due = Signal()
+    start_opened = Signal()
     acknowledged = Signal(str)  #: name of the person
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
@@ -84,11 +103,20 @@ class HighVoltageStatus(QObject):
         self._told = False  # during a run: the output at its end is known
         self._state = HighVoltage.NOT_CONTACTED
         self._deadline = 0.0
+        self._cause = ""  # what has stopped or disarmed, and when
+        self.responsiveness = Responsiveness(self)
+        self._may_start = False
+        self._opening = QTimer(self, interval=round(2 * REACTION * 1000), singleShot=True)
+        self._opening.setTimerType(Qt.TimerType.PreciseTimer)
+        self._opening.timeout.connect(self._open_start)
         self._ticks = QTimer(self, interval=_TICK)
         self._ticks.timeout.connect(self._tick)
         self.reading: Reading | None = None
+        self.run_number = 0
+        self._lock: QLockFile | None = None  # while a run goes on
         self.alarm: LatchedAlarm | None = None
         session.rig_changed.connect(self._rig_changed)
+        session.output_read.connect(self.set_read_at_rest)
         self._restore()
 
     @property
@@ -117,6 +145,16 @@ class HighVoltageStatus(QObject):
         return max(0, int(self._deadline - _now() + 0.999))
 
     @property
+    def may_start(self) -> bool:
+        """True once the operator has been able to see the state ARMED."""
+        return self._may_start and self._phase is HighVoltage.ARMED
+
+    @property
+    def cause(self) -> str:
+        """What has stopped the last run, or disarmed, and when; "" for what came to its end."""
+        return self._cause
+
+    @property
     def words(self) -> str:
         """Sentence on the state: the countdown, or what was measured and when."""
         words = ""
@@ -128,7 +166,8 @@ class HighVoltageStatus(QObject):
             if self._state is HighVoltage.BETWEEN:
                 words = f"{words}; {self._next}"
         simulated = is_simulated(self._session.address)
-        return " · ".join(part for part in (words, "simulated" if simulated else "") if part)
+        parts = (words, self._cause, "simulated" if simulated else "")
+        return " · ".join(part for part in parts if part)
 
     @property
     def detail(self) -> str:
@@ -137,19 +176,59 @@ class HighVoltageStatus(QObject):
             return f"{kilovolts(self.reading.monitor)}  {self.words}".rstrip()
         return self.words
 
+    @property
+    def brief(self) -> str:
+        """What fits below the state: the voltage and its moment, or the time to start."""
+        if self._state is HighVoltage.ARMED:
+            return f"no voltage yet; disarms in {self.seconds_to_start} s"
+        volts, belongs_to = self.number
+        if math.isnan(volts):
+            return self.words
+        moment = belongs_to.replace("\n", " ").replace("monitor at", "at")
+        return kilovolts(volts) if self.live else f"{kilovolts(volts)} {moment}"
+
     # what the runner reports
 
     def set_phase(self, phase: HighVoltage | None) -> None:
         """Set ARMED, ON, RAMPING, or None for rest."""
+        self._may_start = False
+        self._opening.stop()
         if phase is HighVoltage.ARMED:
             self._deadline = _now() + ARMED_FOR
             self._ticks.start()
         else:
             self._ticks.stop()
+        if phase in (HighVoltage.ARMED, HighVoltage.ON):
+            self._cause = ""
         if phase is HighVoltage.ON:
-            self.reading, self._told = None, False
+            self._told = False
+            self._forget_numbers()
         self._phase = phase
         self._refresh()
+
+    def set_cause(self, words: str) -> None:
+        """Say what has stopped or disarmed; the first of several counts."""
+        if not self._cause:
+            self._cause = f"{words}, {_clock(time.time())}"
+            log.info("%s", self._cause)
+            self.changed.emit()
+
+    @Slot(object)
+    def painted(self, state: HighVoltage) -> None:
+        """Take that ``state`` has been drawn."""
+        waits = not (self._may_start or self._opening.isActive())
+        if waits and state is HighVoltage.ARMED and self._phase is HighVoltage.ARMED:
+            self._opening.start()
+
+    @Slot()
+    def _open_start(self) -> None:
+        if self._phase is not HighVoltage.ARMED:
+            return
+        if not self.responsiveness.now:  # the state may not have reached the screen
+            self._opening.start()
+            return
+        self._may_start = True
+        self.start_opened.emit()
 
     def set_between(self, words: str) -> None:
         """Set that a campaign is between two runs; ``words`` say what it does next."""
@@ -161,6 +240,35 @@ class HighVoltageStatus(QObject):
         self._output, self._address, self._told = output, self._session.address, True
         self._refresh()
 
+    @Slot(object)
+    def set_read_at_rest(self, output: OutputState) -> None:
+        """Set what a check of the rig has read; nothing while a run or a campaign goes on."""
+        if self._phase in (None, HighVoltage.ARMED):
+            self.set_output(output)
+
+    def _forget_numbers(self) -> None:
+        self.reading = None
+        self.run_number += 1
+
+    @property
+    def number(self) -> tuple[float, str]:
+        """Voltage at the monitor in V, and what it belongs to; NaN and "" where there is none.
+
+        During a run it is the newest sample. After it, it is what the state was measured with, so
+        that the two never contradict each other; only where nothing was read after the run, it is
+        the last sample.
+        """
+        reading, output = self.reading, self.output
+        if self.live:
+            if reading is None:
+                return math.nan, ""
+            return reading.monitor, f"{reading.seconds:.1f} of {reading.total:.1f} s"
+        if output is not None and output.monitor is not None:
+            return output.monitor, f"monitor at\n{output.time}"
+        if reading is not None and self._state is not HighVoltage.BETWEEN:
+            return reading.monitor, f"last sample,\n{reading.seconds:.2f} s"
+        return math.nan, ""
+
     def show_reading(self, reading: Reading) -> None:
         """Show the newest samples of a run."""
         if reading != self.reading:
@@ -169,6 +277,9 @@ class HighVoltageStatus(QObject):
 
     def run_begins(self) -> None:
         """Keep a note of the run, for a start of the program after this one has died in it."""
+        if not is_simulated(self._session.address):
+            self._lock = self._lock_of(self._session.address)
+            self._lock.tryLock(0)
         self._keep(
             LatchedAlarm(
                 # shown with the time that follows it, which is that of the start
@@ -182,6 +293,9 @@ class HighVoltageStatus(QObject):
     def run_ended(self, alarm: LatchedAlarm | None) -> None:
         """Latch ``alarm``; None for a run that ended as it should."""
         self._keep(alarm)
+        if self._lock is not None:
+            self._lock.unlock()
+            self._lock = None
         self._latch(alarm)
 
     def acknowledge(self, name: str) -> LatchedAlarm | None:
@@ -192,6 +306,7 @@ class HighVoltageStatus(QObject):
         log.warning("%s acknowledged the alarm: %s", name.strip(), alarm.text)
         self._keep(None)
         self._latch(None)
+        self._restore()  # another rig may have left one too
         self.acknowledged.emit(name.strip())
         return alarm
 
@@ -202,8 +317,8 @@ class HighVoltageStatus(QObject):
         else:
             self._session.block(
                 _BLOCK,
-                f"{alarm.headline} at {_clock(alarm.at)}: look at the rig, then acknowledge the "
-                f"alarm in the bar at the top",
+                f"{alarm.summary}: look at the rig, then acknowledge the alarm in the bar at the "
+                f"top",
             )
         self._refresh()
 
@@ -235,7 +350,8 @@ class HighVoltageStatus(QObject):
     @Slot()
     def _rig_changed(self) -> None:
         if not self.running:
-            self.reading = None if self.output is None else self.reading
+            self._cause = ""
+            self._forget_numbers()
             if self.alarm is None:
                 self._restore()
             self._refresh()
@@ -254,11 +370,21 @@ class HighVoltageStatus(QObject):
             self._session.settings.sync()  # the program may die in the next moment
 
     def _restore(self) -> None:
-        """Latch what an earlier start of the program has left for this rig."""
-        address = self._session.address
-        kept = kept_text(self._session.settings, f"{_KEY}/{address}")
-        if not kept or is_simulated(address):
+        """Latch what an earlier start of the program has left: for this rig, else for another."""
+        settings = self._session.settings
+        settings.beginGroup(_KEY)
+        left = [address for address in settings.childKeys() if not is_simulated(address)]
+        settings.endGroup()
+        for address in sorted(left, key=lambda address: address != self._session.address):
+            lock = self._lock_of(address)
+            if not lock.tryLock(0):  # its program goes on
+                continue
+            lock.unlock()
+            self._latch_kept(address)
             return
+
+    def _latch_kept(self, address: str) -> None:
+        kept = kept_text(self._session.settings, f"{_KEY}/{address}")
         try:
             alarm = LatchedAlarm(**json.loads(kept))
         except (TypeError, ValueError):
@@ -269,6 +395,13 @@ class HighVoltageStatus(QObject):
         if alarm.known != Known.CONFIRMED.value:
             self._output, self._address = OutputState(Known.UNKNOWN, alarm.at), address
         self._latch(alarm)
+
+    def _lock_of(self, address: str) -> QLockFile:
+        """Return the lock that a window holds while it plays on the rig at ``address``."""
+        folder = unsaved_folder(self._session.settings).parent / "playing"
+        with contextlib.suppress(OSError):  # a folder that cannot be made locks nothing
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return lock_of(folder / hashlib.sha256(address.encode()).hexdigest()[:16])
 
 
 def _now() -> float:

@@ -1,10 +1,10 @@
-"""Keys that stop: Esc and Space, on every page and with any focus, while the rig is armed or runs.
+"""Keys that stop: Esc and Space, on every page, while the rig is armed or runs.
 
-The whole stroke of a key that has stopped is taken: neither its repetitions nor its release reach
-a button or a field.
-
-One field takes a space in a run: that of a note on the run, and there only one space after a word.
-A space in an empty note, a second one in a row, or one that is held, stops as everywhere.
+Space writes where a text field has the focus, and stops elsewhere. Esc closes what is open and has
+the focus (a menu, a list, a dialog, the guide, the cell that is edited, a search text), and stops
+where nothing is. The whole stroke of a key does the same: neither the repetitions of a key that has
+stopped nor its release reach a button or a field, and the repetitions of a key that has closed or
+written something do not stop.
 """
 
 from __future__ import annotations
@@ -14,32 +14,38 @@ from typing import cast
 
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QInputMethodEvent, QKeyEvent
-from PySide6.QtWidgets import QApplication, QLineEdit
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QComboBox,
+    QLineEdit,
+    QPlainTextEdit,
+    QTextEdit,
+    QWidget,
+)
 
-__all__ = ["WRITES_SPACES", "StopKeys"]
+__all__ = ["StopKeys"]
 
-#: Property of a field for notes on the run.
-WRITES_SPACES = "writes_spaces"
-
-_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Space)
+_NAMES = {Qt.Key.Key_Escape: "Esc", Qt.Key.Key_Space: "Space"}
 _STROKES = (QEvent.Type.KeyPress, QEvent.Type.KeyRelease, QEvent.Type.ShortcutOverride)
 
 
 class StopKeys(QObject):
-    """Calls ``stop`` for a stop key while ``busy`` returns True.
+    """Calls ``stop`` with the name of a stop key while ``busy`` returns True.
 
-    ``watch`` is called with True when the rig is armed or a run begins, and with False when neither
-    is so any more: all events of the program pass the filter meanwhile.
+    ``window`` is the main window: Esc closes others first. ``watch`` is called with True when the
+    rig is armed or a run begins, and with False when neither is so any more: all events of the
+    program pass the filter meanwhile.
     """
 
-    def __init__(
-        self, stop: Callable[[], None], busy: Callable[[], bool], parent: QObject | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, stop: Callable[[str], None], busy: Callable[[], bool], window: QWidget):
+        super().__init__(window)
         self._stop = stop
         self._busy = busy
+        self._window = window
         self._watching = self._installed = False
         self._held: set[int] = set()  # keys that have stopped and are still down
+        self._passed: set[int] = set()  # keys that have closed or written something, and are down
 
     def watch(self, watching: bool) -> None:
         """Begin or end to look at the keys; a key that is still down is taken until its release."""
@@ -49,19 +55,19 @@ class StopKeys(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
         kind = event.type()
         if kind == QEvent.Type.InputMethod:
-            # an input method delivers the space of a text field as text
+            # an input method delivers a space as text
             typed = cast(QInputMethodEvent, event).commitString()
-            if typed == " " and self._busy() and not _between_words():
-                self._stop()
+            if typed == " " and self._busy() and not _writes():
+                self._stop(_NAMES[Qt.Key.Key_Space])
                 return True
-        elif kind in _STROKES and cast(QKeyEvent, event).key() in _KEYS:
-            return self._stroke(kind, cast(QKeyEvent, event))
-        return super().eventFilter(watched, event)
+        elif kind in _STROKES and cast(QKeyEvent, event).key() in _NAMES:
+            return self._stroke(watched, kind, cast(QKeyEvent, event))
+        return False
 
-    def _stroke(self, kind: QEvent.Type, event: QKeyEvent) -> bool:
+    def _stroke(self, watched: QObject, kind: QEvent.Type, event: QKeyEvent) -> bool:
         key, repeated = event.key(), event.isAutoRepeat()
         if kind == QEvent.Type.ShortcutOverride:
-            if key in self._held or self._busy():
+            if key in self._held or (self._busy() and not self._passes(watched, key, repeated)):
                 event.accept()  # it comes as a key press then, not as a shortcut
                 return True
             return False
@@ -69,19 +75,47 @@ class StopKeys(QObject):
             held = key in self._held
             if not repeated:
                 self._held.discard(key)
+                self._passed.discard(key)
                 self._install()
             return held
-        if not repeated:
-            self._held.discard(key)  # a release may have gone to another program
+        if not repeated:  # a release may have gone to another program
+            self._held.discard(key)
+            self._passed.discard(key)
         if key in self._held:
             return True
         if not self._busy():
             self._install()
             return False
-        if key == Qt.Key.Key_Space and not repeated and _between_words():
-            return False
+        if self._passes(watched, key, repeated):
+            self._passed.add(key)
+            return self._clear_search(key)
         self._held.add(key)
-        self._stop()
+        self._stop(_NAMES[Qt.Key(key)])
+        return True
+
+    def _passes(self, watched: QObject, key: int, repeated: bool) -> bool:
+        """Return whether the stroke closes or writes something."""
+        if repeated and key in self._passed:
+            return True
+        if key == Qt.Key.Key_Space:
+            return _writes()
+        return self._is_open(watched)
+
+    def _is_open(self, watched: QObject) -> bool:
+        """Return whether Esc, on its way to ``watched``, has something to close."""
+        if QApplication.activePopupWidget() is not None:
+            return True
+        # a widget, or the window of the system, which does not know its widgets
+        at = watched.window() if isinstance(watched, QWidget) else QApplication.activeWindow()
+        if at is not None and at is not self._window:
+            return True
+        return _edits_a_cell() or _searches(self._window)
+
+    def _clear_search(self, key: int) -> bool:
+        """Clear the search text of the field that has the focus; return whether Esc did that."""
+        if key != Qt.Key.Key_Escape or not _searches(self._window):
+            return False
+        cast(QLineEdit, QApplication.focusWidget()).clear()
         return True
 
     def _install(self) -> None:
@@ -96,10 +130,26 @@ class StopKeys(QObject):
             application.removeEventFilter(self)
 
 
-def _between_words() -> bool:
-    """Return whether a space would follow a word in a field for notes on the run."""
+def _writes() -> bool:
+    """Return whether a text field has the focus that can be written to."""
     field = QApplication.focusWidget()
-    if not isinstance(field, QLineEdit) or not field.property(WRITES_SPACES):
+    if isinstance(field, QLineEdit | QTextEdit | QPlainTextEdit):
+        return field.isEnabled() and not field.isReadOnly()
+    return isinstance(field, QComboBox) and field.isEnabled() and field.isEditable()
+
+
+def _edits_a_cell() -> bool:
+    field = QApplication.focusWidget()
+    parent = None if field is None else field.parentWidget()
+    table = None if parent is None else parent.parentWidget()
+    if not isinstance(table, QAbstractItemView) or parent is not table.viewport():
         return False
-    before = field.text()[: field.cursorPosition()]
-    return bool(before) and not before.endswith(" ")
+    return table.state() == QAbstractItemView.State.EditingState
+
+
+def _searches(window: QWidget) -> bool:
+    """Return whether the focus is in a search text of ``window``: a field that can be cleared."""
+    field = QApplication.focusWidget()
+    if not isinstance(field, QLineEdit) or field.window() is not window:
+        return False
+    return field.isClearButtonEnabled() and bool(field.text())

@@ -22,6 +22,8 @@ _SAMPLE = 18.0  # px, length of a line in the key
 _GAP = 5.0  # px between the line and its name
 _BETWEEN = 16.0  # px between two entries
 _KEY_POINTS = 9.0  # pt, size of the text of keys and labels
+_LEAST_POINTS = 7.0  # pt, of a label beside a low plot
+_CUT = "\N{HORIZONTAL ELLIPSIS}"
 _DAY = 86_400.0  # s
 _FEW_DECADES = 2.5  # below this, powers of ten alone are too few labels
 _LABEL = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)$")
@@ -100,7 +102,7 @@ class Plot(pg.PlotItem):
         self.log = log
         self.dates = dates  #: the horizontal axis is Unix time in s, shown as local time
         self.axis_texts: dict[str, AxisText] = {}
-        self._labels: dict[str, str] = {}
+        self._labels: dict[str, tuple[str, float]] = {}  # that are shown, with their points
         self.drawn: list[Curve] = []
         self.auto_y = True
         self._own_range = own_range
@@ -129,21 +131,25 @@ class Plot(pg.PlotItem):
         self._show_label(side)
 
     def _show_label(self, side: str) -> None:
-        """Show the label of an axis; beside a plot that is too low for it, in two lines."""
+        """Show the label of an axis.
+
+        Beside a plot that is too low for it, it has two lines, then smaller letters, and at last
+        fewer of them: it must not run into the label of the next plot.
+        """
         text = self.axis_texts[side]
-        words = str(text)
-        room = self.vb.height()
-        if side == "left" and text.unit and self.key.width_of(words) > room > 0.0:
-            words = f"{escape(text.name)}<br>{escape(f'({text.unit})')}"
-        else:
-            words = escape(words)  # pyqtgraph takes labels as HTML
-        if words != self._labels.get(side):
-            self._labels[side] = words
+        words, points, room = escape(str(text)), _KEY_POINTS, self.vb.height()
+        if side == "left" and text.unit and self.key.width_of(str(text)) > room > 0.0:
+            room = max(room, self.size().height() - _GAP)  # up to the next plot
+            name, share = text.name, room / max(self.key.width_of(text.name), 1.0)
+            points = max(_LEAST_POINTS, _KEY_POINTS * min(1.0, share))
+            while len(name) > 1 and self.key.width_of(name) * points / _KEY_POINTS > room:
+                name = f"{name.removesuffix(_CUT)[:-1]}{_CUT}"
+            words = f"{escape(name)}<br>{escape(f'({text.unit})')}"
+        if (words, points) != self._labels.get(side):
+            self._labels[side] = (words, points)
             # the styles that are given replace all others
             colour = self.getAxis(side).textPen().color().name()
-            self.setLabel(
-                side, words, **{"font-size": f"{_KEY_POINTS:g}pt", "color": colour}
-            )  # fmt: skip
+            self.setLabel(side, words, **{"font-size": f"{points:g}pt", "color": colour})
 
     def set_auto_y(self, auto: bool) -> None:
         """Let the y axis cover what is visible, or keep its range."""

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.analysis.summary import Curves
 from dearig.recording.reading.marks import marks_in
+from dearig.report.text.numbers import significant
 from dearig.units import SHOWN
 from dearig.window.kit.theme import pen
 from dearig.window.kit.widgets import plain_tip
@@ -19,7 +20,7 @@ from dearig.window.plots.plot import Entry
 from dearig.window.run.channel_plots import ChannelPlots
 from dearig.window.session.state import Session
 
-__all__ = ["CurvesPlot"]
+__all__ = ["CurvesPlot", "rms_text"]
 
 
 class CurvesPlot(QWidget):
@@ -153,3 +154,11 @@ class CurvesPlot(QWidget):
             line.setToolTip(plain_tip(f"{event.time:.4g} s, {event.level}: {event.message}"))
             line.setCursor(Qt.CursorShape.WhatsThisCursor)
             self.plots[1].addItem(line, ignoreBounds=True)
+
+
+def rms_text(curves: Curves) -> str:
+    """Return the RMS error of a recording with its unit, or why there is none."""
+    if curves.errors is None:
+        return curves.unfit
+    shown = SHOWN[curves.kind]
+    return f"{significant(curves.errors.rms * shown.error_factor)} {shown.error_unit} RMS"

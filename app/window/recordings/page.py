@@ -28,9 +28,7 @@ from dearig.analysis.summary import (
     recover_file,
 )
 from dearig.recording.exporters import EXPORTS
-from dearig.report.text.numbers import significant
 from dearig.report.text.tables import Row, Table
-from dearig.units import SHOWN
 from dearig.window.documents.dialogs import choose_file, choose_folder, save_as
 from dearig.window.imports.queue import Imports
 from dearig.window.jobs.worker import Job
@@ -38,7 +36,7 @@ from dearig.window.kit.report_table import ReportTable, two_columns
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, label, menu_button, plain_tip
 from dearig.window.recordings.conditions_table import ConditionsTable
-from dearig.window.recordings.curves_plot import CurvesPlot
+from dearig.window.recordings.curves_plot import CurvesPlot, rms_text
 from dearig.window.recordings.folder_model import FolderModel
 from dearig.window.recordings.library import shared_library
 from dearig.window.recordings.recording_analysis import RecordingAnalysis
@@ -316,8 +314,9 @@ class RecordingsPage(Page):
                 curves, path, self._library.model, self._session.overlay_drive
             )
             job.finished.connect(lambda found, of=of: self._take_curves(found, of))
-            job.failed.connect(self.message.show_text)
+            job.failed.connect(lambda words, of=of, path=path: self._not_read(path, words, of))
             self._reading.append(job)
+        self._show_count()
         if self._differing is not None:
             self._differing.cancel()
             self._differing = None
@@ -352,8 +351,20 @@ class RecordingsPage(Page):
         if of != self._round:
             return
         self._read[found.path] = found
+        self._show_read()
+
+    def _not_read(self, path: Path, words: str, of: int) -> None:
+        if of == self._round:
+            self.message.show_text(words)
+            self._wanted.remove(path)
+            self._show_read()
+
+    def _show_read(self) -> None:
         ready = [self._read[path] for path in self._wanted if path in self._read]
         if len(ready) < len(self._wanted):
+            return
+        self._show_count()
+        if not ready:
             return
         kinds = {c.kind for c in ready}
         if len(kinds) > 1:
@@ -376,7 +387,7 @@ class RecordingsPage(Page):
         if len(shown) == 1:
             self.details.show_table(two_columns("", shown[0].about))
         else:
-            names = tuple((c.name, _rms(c)) for c in shown)
+            names = tuple((c.name, rms_text(c)) for c in shown)
             words = (("", "Select a recording above; several with Ctrl or Shift"),)
             self.details.show_table(two_columns("", names or words))
         rows = tuple(
@@ -565,6 +576,7 @@ class RecordingsPage(Page):
                 words = f"{shown} of {words}"
             if self._library.left:
                 words += f", {self._library.left} to read"
+            words += ", reading curves …" * any(p not in self._read for p in self._wanted)
         self.count.setText(words)
 
     @Slot(int)
@@ -585,12 +597,4 @@ class RecordingsPage(Page):
 
 
 def _files(event: QDropEvent) -> list[Path]:
-    """Return the local files that are dropped."""
     return [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-
-
-def _rms(curves: Curves) -> str:
-    if curves.errors is None:
-        return curves.unfit
-    shown = SHOWN[curves.kind]
-    return f"{significant(curves.errors.rms * shown.error_factor)} {shown.error_unit} RMS"

@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 
 from dearig.acquisition.check import CheckOutcome, check_rig
 from dearig.acquisition.rigs import is_simulated
+from dearig.config.rigfile import RigFile
 from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values
 from dearig.config.toml_edit import with_key
 from dearig.config.toml_input import read_text
@@ -132,7 +133,7 @@ class RigPage(Page):
     def check(self) -> None:
         """Check the instruments; the output stays at 0 V."""
         address, rig_file = self.session.address, self.session.rig_file
-        self._checks.start(lambda: check_rig(address, rig_file))
+        self._checks.start(lambda: (rig_file, check_rig(address, rig_file)))
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Check a simulated rig when the page is shown; a real one waits for the button."""
@@ -141,9 +142,13 @@ class RigPage(Page):
             self.check()
 
     @Slot(object)
-    def _checked(self, outcome: CheckOutcome) -> None:
-        self.outcome = outcome if outcome.rig == self.session.address else None
+    def _checked(self, answer: tuple[RigFile, CheckOutcome]) -> None:
+        (rig_file, outcome), session = answer, self.session
+        is_present = outcome.rig == session.address and rig_file is session.rig_file
+        self.outcome = outcome if is_present else None
         self._show_outcome()
+        if is_present and outcome.output is not None:
+            session.output_read.emit(outcome.output)
 
     @Slot(bool)
     def _checking(self, busy: bool) -> None:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Slot
-from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
+import math
+
+from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtGui import QKeyEvent, QKeySequence, QMouseEvent, QShortcut
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from dearig.drivers.instruments.thermohygrometer import RoomReading
 from dearig.window.high_voltage.bar import label_stop, stop_button
-from dearig.window.high_voltage.state import HighVoltageBadge
+from dearig.window.high_voltage.state import HighVoltage, HighVoltageBadge
 from dearig.window.high_voltage.status import HighVoltageStatus
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import Message, Readout, card, label, set_role
+from dearig.window.kit.widgets import ElidedLabel, Message, Readout, card, label, set_role
 from dearig.window.run.live import RunSnapshot
 from dearig.window.session.state import Session
 
@@ -28,22 +30,55 @@ _SIGNALS = {
     "displacement": (1e3, 4),
 }
 
+#: What a run waits for whose output is known: its end, or a guardian that goes on trying.
+_ENDING = {
+    HighVoltage.CONFIRMED: "At 0 V, the recording is being closed",
+    HighVoltage.COMMANDED: "0 V not confirmed, the run is ending",
+    HighVoltage.UNKNOWN: "Output unknown, the run is ending",
+}
+
 
 class StepButton(QPushButton):
     """Button of a step towards voltage: clicked, or by its own key, pressed once.
 
     It takes no focus, and no other key acts on it: Space is a stop key, and a key that is held
-    repeats itself.
+    repeats itself. What was pressed while the window did not answer is dropped, and ``dropped``
+    says so: nobody has seen what it would act on.
     """
 
-    def __init__(self, text: str, tip: str, key: str, page: QWidget) -> None:
+    dropped = Signal(str)
+
+    def __init__(
+        self, text: str, tip: str, key: str, page: QWidget, status: HighVoltageStatus
+    ) -> None:
         super().__init__(text)
+        self._responsiveness = status.responsiveness
+        self._key = key
         self.setProperty("role", "primary")
         self.setToolTip(f"{tip} ({key})")
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         shortcut = QShortcut(QKeySequence(key), page)
         shortcut.setAutoRepeat(False)
-        shortcut.activated.connect(self.click)
+        shortcut.activated.connect(self._pressed_key)
+
+    @property
+    def answers(self) -> bool:
+        """True where a press would be obeyed: the window answers in time."""
+        return self._responsiveness.now
+
+    @Slot()
+    def _pressed_key(self) -> None:
+        if self.answers:
+            self.click()
+        else:
+            self.dropped.emit(f"{self._key} was pressed while the window was busy: press it again")
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        if self.answers:
+            super().mousePressEvent(event)
+        else:
+            event.accept()
+            self.dropped.emit(f"{self.text()} was pressed while the window was busy: press again")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         event.ignore()
@@ -61,12 +96,16 @@ class RunControls(QWidget):
         super().__init__(parent)
         self._session = session
         self._status = status
+        self._numbers_of = status.run_number  # that the readouts belong to
         self.badge = HighVoltageBadge(large=True)
-        self.arm_button = StepButton("1  Arm", "First step: no voltage yet", "F5", self)
+        self.arm_button = StepButton("1  Arm", "First step: no voltage yet", "F5", self, status)
         self.arm_button.setCheckable(True)
         self.start_button = StepButton(
-            "2  Start", "Second step: play and record the sequence", "F6", self
+            "2  Start", "Second step: play and record the sequence", "F6", self, status
         )
+        for step in (self.arm_button, self.start_button):
+            step.dropped.connect(session.message)
+        self.badge.painted.connect(status.painted)
         self.stop_button = stop_button(26, _STOP_HEIGHT)
         self.time_left = label("", "title")
         self.time_left.setWordWrap(True)
@@ -87,9 +126,13 @@ class RunControls(QWidget):
             step.setMinimumHeight(40)
             steps.addWidget(step)
         column.addLayout(steps)
+        self.rig = ElidedLabel()  # that is in force
+        set_role(self.rig, "muted")
+        column.addWidget(self.rig)
+        column.addWidget(self.stop_button)
+        # below STOP: texts of any length must not move it
         self.blocked = Message()  # why the rig cannot be armed
         column.addWidget(self.blocked)
-        column.addWidget(self.stop_button)
         for widget in (self.time_left, self.segment, self.progress):
             column.addWidget(widget)
         column.addWidget(card(self._readouts()))
@@ -103,20 +146,45 @@ class RunControls(QWidget):
     @Slot()
     def _refresh(self) -> None:
         """Show the high voltage, and whether the readouts are those of this moment."""
-        status, reading = self._status, self._status.reading
-        self.badge.show_state(status.state, status.detail)
+        status = self._status
+        self.badge.show_state(status.state, status.brief)
         label_stop(self.stop_button, status.state)
-        past = reading is not None and not status.live
-        if reading is not None and past:
-            self.of_sample.setText(f"last sample, {reading.seconds:.2f} s")
+        if self._numbers_of != status.run_number:
+            self._clear()
+        self._show_moment()
+
+    def _show_moment(self) -> None:
+        """Say what moment the readouts belong to; at rest they must not contradict the state."""
+        status, reading = self._status, self._status.reading
+        known = reading is not None and self._numbers_of == status.run_number
+        past, output = known and not status.live, status.output
+        if not known or reading is None:
+            text = ""
+        elif status.live:
+            text = "now"
+        elif output is not None and output.monitor is not None:
+            text = f"monitor at {output.time}"
+            for name in _SIGNALS:
+                volts = output.monitor if name == "monitor" else math.nan
+                self.numbers[name].show_number(volts * 1e-3, 3)
         else:
-            self.of_sample.setText("now" if status.live else "")
-        set_role(self.of_sample, "muted")
+            text = f"last sample, {reading.seconds:.2f} s"
+        self.of_sample.setText(text)
         for readout in self.numbers.values():
             readout.show_past(past)
 
+    def _clear(self) -> None:
+        """Show no numbers: rig or run have changed since those that were shown."""
+        self._numbers_of = self._status.run_number
+        for readout in self.numbers.values():
+            readout.show_number(math.nan, 0)
+        for text in (self.time_left, self.segment):
+            text.setText("")
+        self.progress.setValue(0)
+
     def show_numbers(self, now: RunSnapshot) -> None:
         """Show the signals and the errors of the overlay models."""
+        self._numbers_of = self._status.run_number
         for name, (scale, decimals) in _SIGNALS.items():
             self.numbers[name].show_number(now.values.get(name, float("nan")) * scale, decimals)
         for place in (0, 1):
@@ -127,6 +195,19 @@ class RunControls(QWidget):
                 ("nrmse", errors.nrmse_pct if errors else float("nan")),
             ):
                 self.numbers[f"{name} {place}"].show_number(value, 2)
+        self._show_moment()
+
+    def show_progress(self, now: RunSnapshot, segment: str) -> None:
+        """Show how far the run is and what plays; once its output is known, what is waited for."""
+        if not self._status.live:
+            state = self._status.state
+            self.time_left.setText(_ENDING.get(state, state.value.capitalize()))
+            self.segment.setText("")
+            return
+        left = max(0.0, (now.total - now.samples) / now.rate)
+        self.time_left.setText(f"{left:.1f} s left")
+        self.progress.setValue(round(1000 * now.samples / max(now.total, 1)))
+        self.segment.setText(f"playing: {segment}" if segment else "")
 
     def show_room(self, newest: tuple[float, RoomReading] | None, seconds: float) -> None:
         """Show the newest reading of the room at ``seconds`` of the run, with its age."""
@@ -143,6 +224,8 @@ class RunControls(QWidget):
 
     @Slot()
     def _rig_changed(self) -> None:
+        session = self._session
+        self.rig.show_text(f"{session.address} with {session.rig_name}")
         self._room_group.setVisible(self._session.rig_file.thermohygrometer is not None)
 
     def show_models(self) -> None:

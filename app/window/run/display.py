@@ -85,8 +85,8 @@ class RunDisplay(QWidget):
 
     # a run
 
-    def begin(self, live: Live, preview: Preview, name: str, marks: RunMarks) -> None:
-        """Show the run of ``live`` from its start."""
+    def begin(self, live: Live, preview: Preview | None, name: str, marks: RunMarks | None) -> None:
+        """Show the run of ``live`` from its start; without ``marks``, none can be set in it."""
         self._live, self._running, self._drawn = live, True, _NOTHING
         self._marks.clear()
         self._run_channels = self._session.rig_file.channel

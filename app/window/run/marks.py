@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 
 from dearig.acquisition.marks import RunMarks
 from dearig.recording.reading.marks import NOTE_BYTES
-from dearig.window.high_voltage.stop_keys import WRITES_SPACES
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import button
 
@@ -48,7 +47,6 @@ class MarkBar(QWidget):
         self.button.clicked.connect(self.mark)
         self.note = QLineEdit()
         self.note.setAccessibleName("Note of the mark")
-        self.note.setProperty(WRITES_SPACES, True)  # the one field for text in a run
         self.note.setMaxLength(NOTE_BYTES // _UTF8_MAX)
         self.note.textEdited.connect(self._typed)
         self.note.returnPressed.connect(self._entered)

@@ -52,6 +52,8 @@ class RunPage(Page):
         self.live: Live | None = None
         self._played_hold: HoldPlan | None = None  # of the run that is shown
         self._runs = 0
+        self._watched, self._watched_over = "", False  # name of a campaign's run that is shown
+        self._run_number = -1  # of the status, for ``live``
         self._segments: tuple[tuple[str, float, float], ...] = ()
         self._last_recording: Path | None = None
 
@@ -94,9 +96,9 @@ class RunPage(Page):
         )  # fmt: skip
         if not self.runner.start(request, live):
             return
-        if self.live is not None:
-            self.live.close()
+        self._drop_live()
         self.live, self._segments = live, preview.segments
+        self._run_number = self.runner.status.run_number
         self._played_hold = session.hold
         self.display.begin(live, preview, preview.loaded.sequence.name, marks)
         self.result.show_text("")
@@ -106,6 +108,31 @@ class RunPage(Page):
         session.set_running(True)
         self._refresh()
 
+    @Slot(object, str)
+    def watch(self, live: Live, name: str) -> None:
+        """Show a run of a campaign, which ``live`` looks on at and the campaign closes."""
+        self._end_watched("Ended", "the next run of the campaign has begun")
+        self._drop_live()
+        self.live, self._watched, self._segments = live, name, ()
+        self._run_number = self.runner.status.run_number
+        self._played_hold = None
+        self.display.begin(live, None, name, None)
+        self._forget_result()
+        self._numbers.start()
+
+    def _end_watched(self, headline: str, sentence: str, level: str = "info") -> None:
+        """Show the end of a campaign's run, if one is shown that goes on."""
+        if self._watched and not self._watched_over:
+            self._watched_over = True
+            self._update_readouts()
+            self.display.end(headline, f"{self._watched}: {sentence}", level)
+
+    def _drop_live(self) -> None:
+        """Look on at no run any more; that of a campaign is closed by the campaign."""
+        if self.live is not None and not self._watched:
+            self.live.close()
+        self.live, self._watched, self._watched_over = None, "", False
+
     def _refuse_unseen(self) -> None:
         """Disarm: what would be played is not what the plots show."""
         self.result.show_text(
@@ -113,13 +140,13 @@ class RunPage(Page):
             "that they show now, then arm it again.",
             "bad",
         )
-        self.runner.arm(armed=False)
+        self.runner.disarm("disarmed: the plots did not show what would have been played")
         self.display.show_planned()
 
     @Slot()
     def stop(self) -> None:
         """Ramp down to 0 V; during the ramp, go to 0 V at once; before a run, disarm."""
-        self.runner.stop()
+        self.runner.stop("STOP on Run")
 
     def show_model(self, path: Path, place: int = 0) -> None:
         """Use the model in the file ``path`` as overlay model ``place``, 0 or 1."""
@@ -127,14 +154,12 @@ class RunPage(Page):
 
     def close_work(self) -> None:
         """Make the rig safe, and wait for every thread."""
-        self.runner.stop()
+        self.runner.stop("the end of the window")
         self.runner.wait()
         self._numbers.stop()
         self.display.forget_run()
         self.overlays.close_work()
-        if self.live is not None:
-            self.live.close()
-            self.live = None
+        self._drop_live()
 
     @Slot(bool)
     def _arm(self, armed: bool) -> None:
@@ -151,6 +176,11 @@ class RunPage(Page):
         if state is HighVoltage.ARMED:
             self.display.show_planned()
             self._played_hold = None
+        elif state is HighVoltage.BETWEEN:
+            self._forget_result()  # a campaign goes on
+            self._end_watched("Ended", self.runner.status.words)
+        elif self.runner.playing is Play.RUN and not self.runner.status.live:
+            self.display.view.ending()
         self._refresh()
 
     @Slot()
@@ -161,10 +191,11 @@ class RunPage(Page):
         armed = self.runner.armed_for(Play.RUN)
         ready = ready and armed == self.runner.armed  # a campaign is not armed
         if not ready and armed:
-            armed = self.runner.arm(armed=False)
+            self.runner.disarm("disarmed: the plan is no longer that which was armed")
+            armed = False
         self.arm_button.setEnabled(ready)
         self.arm_button.setChecked(armed)
-        self.start_button.setEnabled(ready and armed)
+        self.start_button.setEnabled(ready and armed and self.runner.status.may_start)
         for field in (self.operator, self.film, self.notes, self.paced):
             field.setEnabled(not running)
         self.paced.setVisible(is_simulated(session.address))
@@ -218,7 +249,7 @@ class RunPage(Page):
         live = self.live
         if live is None:
             return
-        if self.runner.playing is Play.CAMPAIGN:  # its readings are shown now
+        if self._run_number != self.runner.status.run_number:  # of another rig or run
             self._numbers.stop()
             return
         now = live.now()
@@ -234,19 +265,17 @@ class RunPage(Page):
         ]
         self.overlay_failures.show_text("; ".join(failures), "warn")
         self._describe_hold()
-        seconds, total = now.samples / now.rate, now.total / now.rate
-        monitor = now.values.get("monitor", float("nan"))
-        self.runner.status.show_reading(Reading(monitor, seconds, total))
         if self.runner.running:
-            left = max(0.0, total - seconds)
-            self.controls.time_left.setText(f"{left:.1f} s left")
-            self.controls.progress.setValue(round(1000 * now.samples / max(now.total, 1)))
-            playing = next((s for s in self._segments if s[1] <= seconds < s[2]), None)
-            self.controls.segment.setText(f"playing: {playing[0]}" if playing else "")
+            seconds, total = now.samples / now.rate, now.total / now.rate
+            monitor = now.values.get("monitor", float("nan"))
+            self.runner.status.show_reading(Reading(monitor, seconds, total))
+            playing = next((s[0] for s in self._segments if s[1] <= seconds < s[2]), "")
+            self.controls.show_progress(now, playing)
 
     @Slot(object)
     def _run_ended(self, end: RunEnd) -> None:
         if end.play is not Play.RUN:
+            self._end_watched(end.headline, end.sentence, _end_level(end))
             self._refresh()
             return
         self._update_readouts()
@@ -265,6 +294,13 @@ class RunPage(Page):
         self._refresh()
         if end.path is not None:
             self.session.recorded.emit(end.path)
+
+    @Slot()
+    def _forget_result(self) -> None:
+        """Show no end of a run that another rig or run has replaced."""
+        if not self.runner.running or self.runner.playing is not Play.RUN:
+            self.result.show_text("")
+            self.show_button.hide()
 
     @Slot()
     def _overlays_changed(self) -> None:
@@ -315,11 +351,13 @@ class RunPage(Page):
         self.stop_button.pressed.connect(self.stop)
         self.runner.state_changed.connect(self._state_changed)
         self.runner.ended.connect(self._run_ended)
+        self.runner.status.start_opened.connect(self._refresh)
         self.runner.status.acknowledged.connect(self.alarms.acknowledge)
         session.preview_changed.connect(self._refresh)
         session.preview_changed.connect(self.display.show_planned)
         session.sequence_changed.connect(self._refresh)
         session.sequence_changed.connect(self.display.show_planned)
+        session.rig_changed.connect(self._forget_result)
         session.rig_changed.connect(self._refresh)
         session.rig_changed.connect(self.display.show_planned)
         self.display.mark_bar.left.connect(self.stop_button.setFocus)

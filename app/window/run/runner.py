@@ -34,7 +34,7 @@ from dearig.model.control import HoldAnswer
 from dearig.output_state import Known, OutputState
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
-from dearig.window.high_voltage.status import HighVoltageStatus, LatchedAlarm
+from dearig.window.high_voltage.status import ARMED_FOR, HighVoltageStatus, LatchedAlarm
 from dearig.window.run.live import Live
 from dearig.window.session.state import Session
 
@@ -153,11 +153,14 @@ class Runner(QObject):
         self.playing: Play | None = None  #: what goes on
         self.status = HighVoltageStatus(session, self)
         self.status.state_changed.connect(self.state_changed)
-        self.status.disarm_due.connect(self.stop)
+        self.status.disarm_due.connect(self._too_late)
         session.blocks_changed.connect(self._blocks_changed)
-        session.rig_changed.connect(self._disarm)  # another rig was armed
-        session.sequence_changed.connect(self._disarm)  # another sequence was armed
-        session.hold_changed.connect(self._disarm)  # with another feedback
+        for changed, what in (
+            (session.rig_changed, "rig"),
+            (session.sequence_changed, "sequence"),
+            (session.hold_changed, "feedback"),
+        ):
+            changed.connect(lambda what=what: self.disarm(f"disarmed: the {what} was changed"))
 
     @property
     def state(self) -> HighVoltage:
@@ -190,15 +193,19 @@ class Runner(QObject):
 
     def start(self, order: RunRequest, live: Live) -> bool:
         """Begin a run; return False if the rig is not armed for one."""
-        if self.running or not self.armed_for(Play.RUN):
+        thread = _RunThread(order, live, self)
+        if not self.begin(thread, Play.RUN):
+            thread.deleteLater()
             return False
-        self.begin(_RunThread(order, live, self), Play.RUN)
         self.status.set_phase(HighVoltage.ON)
         return True
 
     def begin(self, thread: PlayThread, play: Play) -> bool:
-        """Begin what ``thread`` plays; return False if the rig is not armed for ``play``."""
-        if self.running or not self.armed_for(play):
+        """Begin what ``thread`` plays; return False if the rig is not armed for ``play``.
+
+        Before the operator can have seen that it is armed, nothing is begun either.
+        """
+        if self.running or not self.armed_for(play) or not self.status.may_start:
             return False
         self.status.run_begins()
         self._thread, self.playing = thread, play
@@ -208,20 +215,28 @@ class Runner(QObject):
         thread.start(QThread.Priority.TimeCriticalPriority)
         return True
 
-    @Slot()
-    def stop(self) -> None:
+    def stop(self, by: str) -> None:
         """Ramp down to 0 V and end the run, or go to 0 V at once in a ramp; without a run, disarm.
 
-        After the run is at 0 V, or cannot be: stop waiting for the guardian or the disk.
+        After the run is at 0 V, or cannot be: stop waiting for the guardian or the disk. ``by``
+        names what has stopped, as "key Esc on Recordings"; the bar shows it.
         """
         if self._thread is None:
-            self.arm(armed=False)
-        elif self.state is HighVoltage.RAMPING:
+            self.disarm(f"disarmed by {by}")
+            return
+        self.status.set_cause(f"stopped by {by}")
+        if self.state is HighVoltage.RAMPING:
             self._thread.interrupts.ask_at_once()
         else:
             self._thread.interrupts.ask()
             if self.status.live:
                 self.status.set_phase(HighVoltage.RAMPING)
+
+    def disarm(self, cause: str) -> None:
+        """Disarm, if the rig is armed; ``cause`` says why, for the bar."""
+        if self.armed and not self.running:
+            self.arm(armed=False)
+            self.status.set_cause(cause)
 
     def wait(self) -> None:
         """Wait until the run has ended; used when the window closes."""
@@ -229,13 +244,13 @@ class Runner(QObject):
             self._thread.wait()
 
     @Slot()
-    def _disarm(self) -> None:
-        self.arm(armed=False)
+    def _too_late(self) -> None:
+        self.disarm(f"disarmed: not started within {ARMED_FOR:g} s")
 
     @Slot()
     def _blocks_changed(self) -> None:
         if self._session.blocks:
-            self.arm(armed=False)
+            self.disarm("disarmed: something blocks arming")
 
     @Slot()
     def _finished(self) -> None:

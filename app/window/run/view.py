@@ -125,6 +125,10 @@ class RunView(QWidget):
         for made in (self.planned, self.last):
             made.hide()
 
+    def ending(self) -> None:
+        """Say that the run is at its end, and goes on for its guardian or its file only."""
+        self._set_words(self._last.replace("Last run", "Ending", 1), "warn")
+
     def end(self, headline: str, at: datetime | None = None) -> None:
         """Say how the run ended; the plots still show it."""
         moment = at or datetime.now().astimezone()

@@ -23,7 +23,7 @@ from dearig.input_file import read_input
 from dearig.recording.files import write_whole
 from dearig.window.session.text_file import TextFile
 
-__all__ = ["FORMAT", "Recovery", "UnsavedText"]
+__all__ = ["FORMAT", "Recovery", "UnsavedText", "lock_of", "unsaved_folder"]
 
 log = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ class Recovery(QObject):
 
     def __init__(self, settings: QSettings, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._folder = _folder(settings)
+        self._folder = unsaved_folder(settings)
         self._path = self._folder / f"{os.getpid()}-{secrets.token_hex(4)}.json"
         self._lock: QLockFile | None = None
         self._texts: dict[str, tuple[TextFile, str]] = {}
@@ -100,7 +100,7 @@ class Recovery(QObject):
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if self._lock is None:
-                self._lock = _lock_of(self._path)
+                self._lock = lock_of(self._path)
                 self._lock.tryLock(0)
             write_whole(self._path, content.encode("utf-8"))
         except (OSError, InputError) as error:
@@ -120,7 +120,7 @@ class Recovery(QObject):
         files = sorted(self._folder.glob("*.json"), key=lambda path: path.name)
         read = [(path, texts) for path in files if (texts := _read(path))]
         for path, texts in sorted(read, key=lambda f: -max(t.at for t in f[1].values())):
-            lock = _lock_of(path)
+            lock = lock_of(path)
             if path != self._path and lock.tryLock(0):
                 try:
                     yield path, texts
@@ -134,7 +134,7 @@ def _unsaved(file: TextFile, text: str) -> UnsavedText:
     return UnsavedText(text, file.saved, path, folder, file.changes(text), time.time())
 
 
-def _folder(settings: QSettings) -> Path:
+def unsaved_folder(settings: QSettings) -> Path:
     """Return the folder of the recovery files: beside the settings, where these are a file."""
     file = Path(settings.fileName())
     if os.name == "nt" and settings.format() != QSettings.Format.IniFormat:  # the registry
@@ -149,7 +149,8 @@ def _folder(settings: QSettings) -> Path:
     return file.parent / "unsaved"
 
 
-def _lock_of(path: Path) -> QLockFile:
+def lock_of(path: Path) -> QLockFile:
+    """Return the lock of the file ``path``, which ends with the process that holds it."""
     lock = QLockFile(f"{path}.lock")
     lock.setStaleLockTime(0)  # only the end of its process ends it
     return lock

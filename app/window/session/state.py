@@ -99,6 +99,7 @@ class Session(QObject):
     study_finished = Signal(object)  #: a ``Study`` has just been saved in the folder
     hold_changed = Signal()  #: another feedback belongs to the sequence
     blocks_changed = Signal()
+    output_read = Signal(object)  #: state of the output that a check of the rig has read
     message = Signal(str)  #: text for the status bar
 
     def __init__(
@@ -130,6 +131,7 @@ class Session(QObject):
         self.theme = theme
         self.running = False
         self.armed = False
+        self._feedforward = ""  # text of the sequence of the last hold
         self._hold: tuple[HoldPlan, tuple[object, ...]] | None = None
         self._blocks: dict[str, Block] = {}
         self.recovery = Recovery(settings, self)  #: unsaved sequence and rig file
@@ -138,7 +140,15 @@ class Session(QObject):
         """Use the rig ``sim``, ``sim:7``, ``daqmx:Dev1`` or ``daqmx:Dev1@HOST:PORT``."""
         if address != self.address:
             self.address = address
+            self._block_feedforward()
             self.rig_changed.emit()
+
+    @property
+    def rig_name(self) -> str:
+        """Name of the rig file in force, for a person."""
+        if self.rig_path is not None:
+            return self.rig_path.name
+        return "a rig file that is not saved" if self.rig_text else "the rig file of the thesis"
 
     @property
     def rig_source(self) -> str:
@@ -151,6 +161,7 @@ class Session(QObject):
         """Use a rig file; recordings keep its ``text``. ``path`` is None if it is not saved."""
         self.rig_path, self.rig_text, self.rig_file = path, text, rig_file
         self.preview = None  # it was planned with other limits
+        self._block_feedforward()
         self.rig_changed.emit()
         if any(model.path is None for model in self.overlays):
             thesis = self.thesis_model
@@ -163,15 +174,36 @@ class Session(QObject):
             return
         self.sequence_toml, self.sequence_folder, self.sequence_path = toml, folder, path
         self.preview = None  # the plan of the previous sequence
+        self._block_feedforward()
         self.sequence_changed.emit()
 
     def set_hold(self, hold: HoldPlan) -> None:
         """Let the feedback of ``hold`` correct the runs of the present sequence, which is its own.
 
-        Any change of the sequence, the rig, the rig file or the film removes it.
+        Any change of the sequence, the rig, the rig file or the film removes it. What is left of an
+        unchanged sequence then is its ramps without their feedback, which are not the hold: arming
+        is blocked.
         """
-        self._hold = hold, self._hold_conditions()
+        self._hold, self._feedforward = (hold, self._hold_conditions()), self.sequence_toml
+        self._block_feedforward()
         self.hold_changed.emit()
+
+    @property
+    def is_feedforward(self) -> bool:
+        """True while the sequence is that of a hold, with its feedback or without."""
+        return bool(self._feedforward) and self.sequence_toml == self._feedforward
+
+    def _block_feedforward(self) -> None:
+        if self.is_feedforward and self.hold is None:
+            self.block(
+                "hold",
+                "the feedback of the hold was removed with the change of rig, rig file or film, "
+                "and its ramps alone do not hold the film; prepare the hold again, or choose "
+                "another sequence",
+                "Follow",
+            )
+        else:
+            self.unblock("hold")
 
     @property
     def hold(self) -> HoldPlan | None:
@@ -211,6 +243,7 @@ class Session(QObject):
         film_before, self.operator, self.film, self.notes = self.film, operator, film, notes
         self.settings.setValue("operator", operator)
         self.settings.setValue("film", film)
+        self._block_feedforward()
         self.notes_changed.emit()
         if film != film_before and self.rig_file.film.name:  # the limits hold for one film
             self.preview = None

@@ -1,26 +1,27 @@
-"""Banners under the bar of the main window: what the operator must know on every page."""
+"""Banner in the bar of the main window: what the operator must know on every page."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QPoint, Qt, Slot
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import button, label
+from dearig.window.kit.widgets import ElidedLabel, button, label, set_role
 from dearig.window.session.state import Block
 
 __all__ = ["Banners"]
 
-_SHOWN_MAX = 3  # the pages keep their place; further banners are counted
+_LIST = 640  # px, width of the list of all banners
 
 
 class Banners(QWidget):
-    """A row for each banner, the newest last. ``show_page`` opens the page with that title.
+    """One line with the first banner; a button lists all of them, whole.
 
-    The blocks of the session that name a page have a banner each; others are shown by ``show_text``
-    and stay until ``hide_text``.
+    The line has a place of its own in the bar, so that no banner moves the pages and STOP.
+    ``show_page`` opens the page with that title. The blocks of the session that name a page have a
+    banner each; others are shown by ``show_text`` and stay until ``hide_text``.
     """
 
     def __init__(self, show_page: Callable[[str], None], parent: QWidget | None = None) -> None:
@@ -28,10 +29,20 @@ class Banners(QWidget):
         self._show_page = show_page
         self._texts: dict[str, tuple[str, str]] = {}
         self._blocks: dict[str, tuple[str, str]] = {}
-        self._rows = QVBoxLayout(self)
-        self._rows.setContentsMargins(SPACE, 0, SPACE, 0)
-        self._rows.setSpacing(SPACE // 2)
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+        self.words = ElidedLabel()
+        set_role(self.words, "warn")
+        self.page_button = self._button("")
+        self.page_button.clicked.connect(self._go_to_first)
+        self.all_button = self._button("All …")
+        self.all_button.setToolTip("Show the whole text of every notice")
+        self.all_button.clicked.connect(self._show_all)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(SPACE)
+        row.addWidget(self.words, 1)
+        row.addWidget(self.page_button)
+        row.addWidget(self.all_button)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.hide()
 
     def show_text(self, key: str, text: str, page: str = "") -> None:
@@ -56,34 +67,53 @@ class Banners(QWidget):
     @property
     def texts(self) -> list[str]:
         """Texts of all banners, in their order."""
-        return [text for text, _ in (*self._blocks.values(), *self._texts.values())]
+        return [text for text, _ in self._all]
+
+    @property
+    def _all(self) -> list[tuple[str, str]]:
+        return [*self._blocks.values(), *self._texts.values()]
 
     def _refresh(self) -> None:
-        while self._rows.count():
-            item = self._rows.takeAt(0)
-            widget = None if item is None else item.widget()
-            if widget is not None:
-                widget.hide()
-                widget.deleteLater()
-        banners = [*self._blocks.values(), *self._texts.values()]
-        for text, page in banners[:_SHOWN_MAX]:
-            self._rows.addWidget(self._row(text, page))
-        more = len(banners) - _SHOWN_MAX
-        if more > 0:
-            self._rows.addWidget(label(f"and {more} more", "muted"))
+        banners = self._all
+        if banners:
+            text, page = banners[0]
+            self.words.show_text(f"⚠  {text}")
+            self.page_button.setText(f"Go to {page}")
+            self.page_button.setToolTip(f"Open the page {page}")
+            self.page_button.setVisible(bool(page))
+            count = len(banners)
+            self.all_button.setText(f"All {count} …" if count > 1 else "Whole text …")
         self.setVisible(bool(banners))
 
-    def _row(self, text: str, page: str) -> QFrame:
-        frame = QFrame()
-        frame.setProperty("role", "banner")
-        row = QHBoxLayout(frame)
-        row.setContentsMargins(SPACE, SPACE // 2, SPACE, SPACE // 2)
-        words = QLabel(f"⚠  {text}")
-        words.setTextFormat(Qt.TextFormat.PlainText)
-        words.setWordWrap(True)
-        row.addWidget(words, 1)
-        if page:
-            to_page = button(f"Go to {page}", f"Open the page {page}")
-            to_page.clicked.connect(lambda _=False: self._show_page(page))
-            row.addWidget(to_page)
-        return frame
+    @Slot()
+    def _go_to_first(self) -> None:
+        if self._all:
+            self._show_page(self._all[0][1])
+
+    @Slot()
+    def _show_all(self) -> None:
+        """Show every banner with its whole text in a list that closes by itself."""
+        shown = QFrame(self, Qt.WindowType.Popup)
+        shown.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        shown.setProperty("role", "card")
+        grid = QGridLayout(shown)
+        for row, (text, page) in enumerate(self._all):
+            words = label(f"⚠  {text}", "warn")
+            words.setWordWrap(True)
+            words.setFixedWidth(_LIST)
+            grid.addWidget(words, row, 0)
+            if page:
+                go = self._button(f"Go to {page}")
+                go.clicked.connect(shown.close)
+                go.clicked.connect(lambda _=False, page=page: self._show_page(page))
+                grid.addWidget(go, row, 1)
+        shown.adjustSize()
+        corner = self.mapToGlobal(QPoint(self.width() - shown.width(), self.height()))
+        shown.move(max(corner.x(), 0), corner.y())
+        shown.show()
+
+    @staticmethod
+    def _button(text: str) -> QPushButton:
+        made = button(text, "")
+        made.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # no stop key may press it
+        return made

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QWidget
 
 from dearig.acquisition.warm_up import compile_kernels, has_cache, is_warm, kernels_compiled
 from dearig.window.jobs.background import Background
@@ -116,10 +116,7 @@ class CompilationBar(QFrame):
     def __init__(self, compilation: Compilation, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._compilation = compilation
-        self.setProperty("role", "card")
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self.words = label("")
-        self.words.setWordWrap(True)
         self.bar = QProgressBar()
         self.bar.setRange(0, 0)  # it moves without an end
         self.bar.setTextVisible(False)
@@ -127,7 +124,7 @@ class CompilationBar(QFrame):
         self.bar.setFixedWidth(180)
         self.bar.setAccessibleName("The model is being compiled")
         row = QHBoxLayout(self)
-        row.setContentsMargins(SPACE, SPACE // 2, SPACE, SPACE // 2)
+        row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(SPACE)
         row.addWidget(self.bar)
         row.addWidget(self.words, 1)
@@ -142,6 +139,5 @@ class CompilationBar(QFrame):
         if running:
             self.words.setText(
                 f"Compiling the model once, about a minute: {self._compilation.seconds:.0f} s, "
-                f"{self._compilation.kernels} functions. Everything that needs no model can be "
-                f"used: Sequence, Rig, Recordings. The plan follows."
+                f"{self._compilation.kernels} functions; the plan follows"
             )

@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Slot
-from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QKeySequence, QShowEvent
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QGuiApplication,
+    QKeySequence,
+    QMoveEvent,
+    QShowEvent,
+)
 from PySide6.QtWidgets import (
     QApplication,
     QFrame,
@@ -17,6 +24,7 @@ from PySide6.QtWidgets import (
     QMessageBox,
     QScrollArea,
     QStackedWidget,
+    QStyle,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -29,6 +37,7 @@ from dearig.window.documents.questions import may_close, offer_unsaved
 from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.stop_keys import StopKeys
 from dearig.window.kit.theme import DARK, LIGHT, SPACE, apply, system_theme
+from dearig.window.kit.wheel_guard import WheelGuard
 from dearig.window.kit.widgets import label, plain_tip
 from dearig.window.recordings.library import shared_library
 from dearig.window.recordings.page import RecordingsPage
@@ -50,6 +59,7 @@ from dearig.window.shell.pages import PAGES
 __all__ = ["MainWindow"]
 
 _COLOUR_SCHEMES = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
+_SETTLING = 1000  # ms after the window is shown in which a window manager gives it its frame
 P = TypeVar("P", bound=Page)
 
 
@@ -60,6 +70,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.session = session
         self.setWindowTitle("dearig[*]")  # Qt shows a mark there while something is not saved
+        self.wheel_guard = WheelGuard(self)  # before any field is shown
         self.planner = Planner(session, self)
         self.compilation = Compilation(self)
         self.library = shared_library(session)  # lists the folder while the window is made
@@ -70,10 +81,10 @@ class MainWindow(QMainWindow):
         for kind in PAGES:
             if kind.at_start:
                 self.page(kind)
-        self.stop_keys = StopKeys(self.run_page.stop, lambda: session.busy, self)
+        self.stop_keys = StopKeys(self._stop_by_key, lambda: session.busy, self)
         self._build()
         self._guide: Guide | None = None
-        self._closing = False
+        self._closing = self._settling = False
         self._by_signal = False  # closed by a signal: nobody is there to be asked
         self._connect()
         self._apply_colour_scheme()
@@ -149,8 +160,20 @@ class MainWindow(QMainWindow):
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Fit the window, with its frame, into the screen: the bar with STOP must be visible."""
         super().showEvent(event)
-        # the frame of the window manager is known only after the window is shown
+        self._settling = True
         QTimer.singleShot(0, self._fit_screen)
+        # a window manager adds its frame, and moves the window for it, soon after that
+        QTimer.singleShot(_SETTLING, self._settled)
+
+    def moveEvent(self, event: QMoveEvent) -> None:  # noqa: N802
+        super().moveEvent(event)
+        if self._settling:
+            QTimer.singleShot(0, self._fit_screen)
+
+    @Slot()
+    def _settled(self) -> None:
+        self._fit_screen()
+        self._settling = False
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Ask during a run, and make the rig safe whatever the answer."""
@@ -161,7 +184,7 @@ class MainWindow(QMainWindow):
         self._closing = True
         if runner.running:
             # the window shows the ramp, and closes when the run has ended
-            runner.stop()
+            runner.stop("the end of the window")
             event.ignore()
             return
         if not self._by_signal and not may_close(self, self.session):
@@ -202,7 +225,7 @@ class MainWindow(QMainWindow):
     def _ask_to_close(self) -> bool:
         """Stop the run and return True if the window is to close afterwards."""
         runner = self.run_page.runner
-        runner.stop()
+        runner.stop("closing the window")
         asked = QMessageBox(self)
         campaign = runner.playing is Play.CAMPAIGN
         what = "campaign" if campaign else "run"
@@ -227,7 +250,7 @@ class MainWindow(QMainWindow):
         self.list.setObjectName("pages")
         self.list.setFixedWidth(132)
         self.list.setAccessibleName("Pages")
-        self.stack = QStackedWidget()
+        self.stack = _Stack()
         for place, kind in enumerate(PAGES):
             shortcut = f"Ctrl+{place + 1}"
             self.list.addItem(kind.title)
@@ -257,12 +280,12 @@ class MainWindow(QMainWindow):
         self._top.setContentsMargins(0, 0, 0, 0)
         self._top.setSpacing(SPACE // 2)
         self.bar = HighVoltageBar(self.run_page.runner.status, self.session)
+        self.bar.add_notices(self.banners)
         self._top.addWidget(self.bar)
-        self._top.addWidget(self.banners)
-        self._top.addWidget(CompilationBar(self.compilation))
+        self._top.addLayout(row, 1)
+        # below the pages: what comes and goes must not move them
         self.error_panel = ErrorPanel(self.session.program_errors)
         self._top.addWidget(self.error_panel)
-        self._top.addLayout(row, 1)
         middle = QWidget()
         middle.setLayout(self._top)
         self.setCentralWidget(middle)
@@ -270,6 +293,7 @@ class MainWindow(QMainWindow):
         bar.setSizeGripEnabled(False)
         self.status = label("")
         bar.addWidget(self.status, 1)
+        bar.addPermanentWidget(CompilationBar(self.compilation))
         self.rig_and_folder = label("", "muted")
         bar.addPermanentWidget(self.rig_and_folder)
 
@@ -305,7 +329,7 @@ class MainWindow(QMainWindow):
 
     def _connect(self) -> None:
         session, run = self.session, self.run_page
-        self.bar.stop_pressed.connect(run.stop)
+        self.bar.stop_pressed.connect(lambda: run.runner.stop(f"STOP on {self._title()}"))
         run.runner.state_changed.connect(self._watch_keys)
         run.runner.ended.connect(self._run_ended, Qt.ConnectionType.QueuedConnection)
         session.recovery.changed.connect(self._unsaved_changed)
@@ -323,6 +347,13 @@ class MainWindow(QMainWindow):
         self.banners.show_blocks(session.blocks)
         self._rig_or_folder_changed()
 
+    def _stop_by_key(self, key: str) -> None:
+        self.run_page.runner.stop(f"key {key} on {self._title()}")
+
+    def _title(self) -> str:
+        """Return the title of the page that is shown."""
+        return PAGES[self.list.currentRow()].title
+
     @Slot()
     def _watch_keys(self) -> None:
         self.stop_keys.watch(self.session.busy)
@@ -330,7 +361,10 @@ class MainWindow(QMainWindow):
     @Slot()
     def _rig_or_folder_changed(self) -> None:
         folder = self.session.folder
-        self.rig_and_folder.setText(f"rig {self.session.address}   ·   {folder.name or folder}  ")
+        session = self.session
+        self.rig_and_folder.setText(
+            f"rig {session.address}, {session.rig_name}   ·   {folder.name or folder}  "
+        )
         self.rig_and_folder.setToolTip(plain_tip(f"Folder of the recordings: {folder}"))
 
     @Slot(int)
@@ -391,7 +425,9 @@ class MainWindow(QMainWindow):
 
     def _default_geometry(self) -> None:
         available = QGuiApplication.primaryScreen().availableSize()
-        self.resize(available.boundedTo(QSize(1600, 980)))
+        # the frame, which is not known yet, has a title of some such height
+        title = self.style().pixelMetric(QStyle.PixelMetric.PM_TitleBarHeight)
+        self.resize((available - QSize(0, title)).boundedTo(QSize(1600, 980)))
 
     @Slot()
     def _fit_screen(self) -> None:
@@ -408,6 +444,18 @@ class MainWindow(QMainWindow):
         top = max(available.top(), min(frame.top(), available.bottom() + 1 - frame.height()))
         if (left, top) != (frame.left(), frame.top()):
             self.move(QPoint(left, top))
+
+
+class _Stack(QStackedWidget):
+    """Pages of which each needs no more room than it has itself."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.currentChanged.connect(self.updateGeometry)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        shown = self.currentWidget()
+        return super().minimumSizeHint() if shown is None else shown.minimumSizeHint()
 
 
 def _scrollable(pages: QWidget) -> QScrollArea:

@@ -43,7 +43,7 @@ from dearig.window.session.page import Page
 from dearig.window.session.state import Session
 from dearig.window.study.before_after_plot import BeforeAfterPlot
 from dearig.window.study.residual_plots import ResidualPlots
-from dearig.window.study.training_table import TrainingTable
+from dearig.window.study.training_table import TrainingPanel, TrainingTable
 from dearig.window.study.trends_panel import TrendsPanel
 
 __all__ = ["StudyPage"]
@@ -55,7 +55,7 @@ _ENDED_EARLY = (
     ("Leave these recordings out", "leave-out"),
     ("Use them as they are", "keep"),
 )
-_LEFT = 330  # px, default width of the left column
+_LEFT = 400  # px, default width of the left column
 _LISTED_MAX = 30  # studies in the menu; a longer one does not fit on a screen
 
 
@@ -98,7 +98,7 @@ class StudyPage(Page):
         self.recordings = TrainingTable(self._library)
         self.recordings.changed.connect(self._enable)
         self.recordings.changed.connect(self._warn)
-        hint = label("Select recordings for training, and others for validation.", "muted")
+        hint = label("Choose recordings for training, and others for validation.", "muted")
         hint.setWordWrap(True)
 
         self.diagnose = QRadioButton("&Diagnose: find missing effects")
@@ -149,7 +149,8 @@ class StudyPage(Page):
 
         inner = QVBoxLayout()
         inner.addWidget(label("Recordings", "heading"))
-        inner.addWidget(self.recordings, 1)
+        self.choice = TrainingPanel(self.recordings)
+        inner.addWidget(self.choice, 1)
         inner.addWidget(hint)
         inner.addWidget(self.warning)
         inner.addWidget(self.ended_early)
@@ -160,7 +161,7 @@ class StudyPage(Page):
         inner.addWidget(self.bar)
         inner.addWidget(self.stage)
         frame = card(inner)
-        frame.setMinimumWidth(280)
+        frame.setMinimumWidth(frame.minimumSizeHint().width())
         return frame
 
     def _make_results(self) -> QWidget:

@@ -37,9 +37,9 @@ __all__ = ["TrendsPanel"]
 
 _EVERY = "All films"
 _INTRODUCTION = (
-    "Open the table of a study of many recordings: study.csv, which the command dearig study "
-    "writes. Its parameters and errors are shown against temperature, humidity, cycles and days: "
-    "what is common to all films, what is one film's own, change points, and what to vary next.",
+    "Open the table of a study of many recordings, a file study.csv. Its parameters and errors are "
+    "shown against temperature, humidity, cycles and days: what is common to all films, what is "
+    "one film's own, change points, and what to vary next.",
 )
 _BAND_ALPHA = 60  # of 255
 _PLOT, _WORDS = 380, 260  # px, default heights of plot and words

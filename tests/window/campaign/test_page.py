@@ -24,12 +24,14 @@ from dearig.recording import open_recording
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.campaign.compute import ComputeProcess
 from dearig.window.campaign.page import CampaignPage
+from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.jobs.worker_process import Response
 from dearig.window.run.runner import Play, Runner
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import TextFile
 from dearig.window.shell.frame import MainWindow
+from tests.window.conftest import press
 from tests.window.run.test_stories import click
 
 _PATIENCE = 120_000  # ms; of a machine that may be busy
@@ -58,7 +60,7 @@ def runner(session: Session) -> Iterator[Runner]:
     session.set_rig_file(None, "", RIG)
     made = Runner(session, session)
     yield made
-    made.stop()
+    made.stop("the end of a test")
     made.wait()
 
 
@@ -66,7 +68,9 @@ def runner(session: Session) -> Iterator[Runner]:
 def page(
     session: Session, runner: Runner, keep: Callable[[QWidget], None], tmp_path: Path, qtbot: QtBot
 ) -> CampaignPage:
-    """The page alone, with three short runs that are within all limits."""
+    """The page alone, with three short runs that are within all limits, and the bar."""
+    bar = HighVoltageBar(runner.status, session)  # where ARMED is seen
+    keep(bar)
     (tmp_path / "lobe.toml").write_text(LOBE, "utf-8")
     shown = CampaignPage(session, runner)
     write(shown, PLAN, tmp_path)
@@ -89,8 +93,8 @@ def states(page: CampaignPage) -> list[str]:
 
 
 def begin(qtbot: QtBot, page: CampaignPage) -> None:
-    click(qtbot, page.controls.arm)
-    click(qtbot, page.controls.start)
+    press(qtbot, page.controls.arm)
+    press(qtbot, page.controls.start)
 
 
 def ended(qtbot: QtBot, runner: Runner) -> None:
@@ -140,6 +144,36 @@ def test_a_batch_is_foreseen_armed_and_played_as_by_the_command(
     assert page.controls.blocked.text() == "No run waits."
 
 
+def test_the_present_run_is_shown_live_on_its_page_and_on_run(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    """Its curves and numbers, with the overlay models, as those of any run."""
+    window.session.set_rig_file(None, "", RIG)
+    page, run = window.page(CampaignPage), window.run_page
+    (tmp_path / "lobe.toml").write_text(LOBE, "utf-8")
+    write(page, PLAN, tmp_path)
+    window.show_page(page)
+    surveyed(qtbot, page)
+    page.controls.operator.setText("Ada")
+    page.controls.paced.setChecked(True)
+    begin(qtbot, page)
+    plots = page.present_run.plots
+    qtbot.waitUntil(lambda: plots.curve("displacement")[0].size > 100, timeout=_PATIENCE)
+    assert page.present_run.isVisible()
+    assert page.controls.numbers["displacement"].text != "—"
+    window.show_page(run)
+    qtbot.waitUntil(lambda: run.plots.curve("model 0")[0].size > 100, timeout=_PATIENCE)
+    words = run.display.view.words
+    assert words.text() in [f"Running: {name}" for name in NAMES]
+    qtbot.waitUntil(lambda: run.controls.numbers["rms 0"].text != "—", timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: words.text() == f"Running: {NAMES[2]}", timeout=_PATIENCE)
+    ended(qtbot, run.runner)
+    assert words.text().startswith(f"Last run: {NAMES[2]}, ended at ")
+    assert page.controls.numbers["displacement"].text == "—"
+    started = [a.message for a in run.alarms.alarms if "run started" in a.message]
+    assert started == [f"{name}: run started" for name in NAMES]
+
+
 def test_what_is_refused_stands_in_the_table_and_nothing_can_be_armed(
     qtbot: QtBot, page: CampaignPage, tmp_path: Path
 ) -> None:
@@ -162,7 +196,7 @@ def test_what_is_refused_stands_in_the_table_and_nothing_can_be_armed(
 def test_an_armed_batch_is_that_which_was_declared_and_no_run(
     qtbot: QtBot, page: CampaignPage, runner: Runner, session: Session
 ) -> None:
-    click(qtbot, page.controls.arm)
+    press(qtbot, page.controls.arm)
     assert runner.armed_for(Play.CAMPAIGN)
     assert not runner.armed_for(Play.RUN)
     assert not runner.arm(True, Play.RUN)
@@ -170,7 +204,7 @@ def test_an_armed_batch_is_that_which_was_declared_and_no_run(
     assert not runner.armed
     qtbot.keyClick(page, Qt.Key.Key_F5)
     assert runner.armed_for(Play.CAMPAIGN)
-    runner.stop()
+    runner.stop("a test")
     assert not runner.armed
     # the survey of a plan that was changed while it was made
     found = page._survey
@@ -184,7 +218,7 @@ def test_an_armed_batch_is_that_which_was_declared_and_no_run(
     assert runner.arm(True, Play.RUN)
     assert not page.controls.arm.isEnabled()
     assert "A run is armed" in page.controls.blocked.text()
-    runner.stop()
+    runner.stop("a test")
 
 
 def test_the_queue_is_paused_reordered_cut_and_ended(
@@ -221,7 +255,7 @@ def test_stop_ends_run_and_campaign_at_zero_and_it_goes_on_later(
     page.controls.paced.setChecked(True)
     begin(qtbot, page)
     qtbot.waitUntil(lambda: far(page, 0.5), timeout=_PATIENCE)
-    runner.stop()
+    runner.stop("a test")
     assert runner.state is HighVoltage.RAMPING
     ended(qtbot, runner)
     assert runner.state is HighVoltage.CONFIRMED
@@ -327,13 +361,13 @@ def test_the_window_closes_in_a_campaign_at_zero_and_the_journal_goes_on(
     window.show_page(page)
     surveyed(qtbot, page)
     page.controls.paced.setChecked(True)
-    click(qtbot, page.controls.arm)
+    press(qtbot, page.controls.arm)
     window.show_page(window.run_page)
     qtbot.keyClick(window, Qt.Key.Key_F6)  # what is armed is no run
     assert not runner.running
     assert not window.run_page.arm_button.isEnabled()
     window.show_page(page)
-    click(qtbot, page.controls.start)
+    press(qtbot, page.controls.start)
     qtbot.waitUntil(lambda: far(page, 0.5), timeout=_PATIENCE)
     window.show_page(window.run_page)
     assert "a campaign goes on" in window.run_page.blocked.text()

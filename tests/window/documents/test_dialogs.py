@@ -15,6 +15,7 @@ import dearig.window
 from dearig.window.documents import dialogs
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from tests.window.conftest import press
 
 LEFT = Qt.MouseButton.LeftButton
 RUN_MS = 60_000
@@ -38,8 +39,8 @@ def test_stop_works_beside_an_open_dialog(
 ) -> None:
     page, session = window.run_page, window.session
     page.paced.setChecked(True)
-    qtbot.mouseClick(page.arm_button, LEFT)
-    qtbot.mouseClick(page.start_button, LEFT)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     saw: list[str] = []
 
     def look() -> None:

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import RigFile
-from dearig.config.targetfile import EXAMPLE
 from dearig.drivers.settings import CardSettings, LimitsSettings
 from dearig.errors import InputError
 from dearig.recording import open_recording
@@ -19,6 +18,7 @@ from dearig.window.follow.hold_jobs import measure_hold
 from dearig.window.follow.page import FollowPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from tests.window.conftest import press
 from tests.window.follow.test_page import Here, words
 from tests.window.run.test_stories import click, play
 
@@ -102,7 +102,7 @@ def test_a_hold_is_checked_armed_on_run_watched_and_measured(
     # the newest answer stands until another run is armed, or the hold is removed
     run._refresh()
     assert "error" in run.hold_state.text()
-    click(qtbot, run.arm_button)
+    press(qtbot, run.arm_button)
     qtbot.waitUntil(lambda: "Feedback holds 0.3 mm" in run.hold_state.text(), timeout=_PATIENCE)
     session.set_notes("Ada", "another film", "")
     run._update_readouts()
@@ -143,7 +143,7 @@ def test_any_change_of_what_is_played_removes_the_feedback(
 def test_what_cannot_be_held_is_said_before_anything_is_played(
     qtbot: QtBot, page: FollowPage, session: Session
 ) -> None:
-    panel = page.hold
+    panel, target = page.hold, page.target.toml
     panel.displacement.setValue(20.0)
     click(qtbot, panel.check_button)
     idle(qtbot, page)
@@ -156,4 +156,4 @@ def test_what_cannot_be_held_is_said_before_anything_is_played(
     click(qtbot, panel.check_button)
     idle(qtbot, page)
     assert "time at 1 kV or more" in panel.message.text()
-    assert page.target.toml == EXAMPLE  # the other mode is as it was
+    assert page.target.toml == target  # the other mode is as it was

@@ -24,6 +24,7 @@ from dearig.window.jobs.worker_process import Request
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from tests.tools.targets import UP_AND_DOWN
+from tests.window.conftest import press
 from tests.window.made_recordings import made
 from tests.window.run.test_stories import click, play, seconds
 
@@ -124,9 +125,9 @@ def test_runs_are_shown_armed_one_by_one_stopped_and_learned_from(
     # STOP in the second run: 0 V, and what was learned is kept
     show()
     run.paced.setChecked(True)
-    click(qtbot, run.arm_button)
+    press(qtbot, run.arm_button)
     with qtbot.waitSignal(session.recorded, timeout=_PATIENCE) as ended:
-        click(qtbot, run.start_button)
+        press(qtbot, run.start_button)
         qtbot.waitUntil(lambda: seconds(run) > 0.7, timeout=_PATIENCE)
         click(qtbot, run.stop_button)
     qtbot.waitUntil(lambda: bool(page.message.text()), timeout=_PATIENCE)

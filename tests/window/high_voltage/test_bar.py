@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import subprocess
+import sys
 from collections.abc import Callable
 
 import pytest
@@ -21,7 +23,7 @@ from dearig.window.rig.page import RigPage
 from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
-from tests.window.conftest import SHORT
+from tests.window.conftest import SHORT, press
 
 LEFT = Qt.MouseButton.LeftButton
 RUN_MS = 60_000
@@ -29,9 +31,9 @@ ARC = "arc@0.5+0.2"
 
 
 def play(qtbot: QtBot, page: RunPage) -> None:
-    qtbot.mouseClick(page.arm_button, LEFT)
+    press(qtbot, page.arm_button)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS):
-        qtbot.mouseClick(page.start_button, LEFT)
+        press(qtbot, page.start_button)
 
 
 def test_stop_can_be_clicked_on_every_page(
@@ -42,10 +44,10 @@ def test_stop_can_be_clicked_on_every_page(
     page.paced.setChecked(True)
     for other in window.pages:
         window.show_page(page)
-        qtbot.mouseClick(page.arm_button, LEFT)
+        press(qtbot, page.arm_button)
         window.show_page(other)
         assert bar.badge.state is HighVoltage.ARMED
-        qtbot.mouseClick(page.start_button, LEFT)
+        press(qtbot, page.start_button)
         with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
             assert bar.badge.state is HighVoltage.ON
             # what lies at this place of the window is STOP: nothing covers it
@@ -56,14 +58,14 @@ def test_stop_can_be_clicked_on_every_page(
         assert ended.args[0].headline == "Stopped"
 
 
-def test_the_bar_shows_the_monitor_and_the_time_and_greys_the_last_sample(
+def test_the_bar_shows_the_monitor_and_the_time_and_greys_what_was_read_after_it(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:
     page, bar = window.run_page, window.bar
     plan_of(SHORT.replace("frequency_Hz = 2.0", "frequency_Hz = 0.2"))  # above 1 kV for 2 s
     page.paced.setChecked(True)
-    qtbot.mouseClick(page.arm_button, LEFT)
-    qtbot.mouseClick(page.start_button, LEFT)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     window.show_page(window.page(RigPage))
     qtbot.waitUntil(
         lambda: float(bar.monitor.text().split()[0].replace("—", "0")) > 1.0, timeout=RUN_MS
@@ -71,11 +73,11 @@ def test_the_bar_shows_the_monitor_and_the_time_and_greys_the_last_sample(
     assert bar.time.text().endswith("s")
     assert bar.monitor.property("role") != "muted"
     qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)
-    recording = open_recording(next(window.session.folder.glob("*.h5")))
-    seconds = recording.samples / recording.rate
-    assert bar.time.text() == f"last sample,\n{seconds:.2f} s"
+    output = page.runner.status.output
+    assert output is not None
+    assert bar.time.text() == f"monitor at\n{output.time}"
     assert bar.monitor.property("role") == "muted"
-    assert page.controls.of_sample.text() == f"last sample, {seconds:.2f} s"
+    assert page.controls.of_sample.text() == f"monitor at {output.time}"
     assert page.controls.numbers["monitor"]._value.property("role") == "muted"
 
 
@@ -164,25 +166,64 @@ def test_what_is_unknown_is_shown_while_the_run_still_waits(session: Session) ->
     assert not status.live
 
 
-def test_the_alarm_of_a_real_rig_outlives_the_program(session: Session) -> None:
-    session.set_address("daqmx:Dev1")
-    first = HighVoltageStatus(session)
-    first.run_begins()
-    # the program has died in the run
-    again = Session(session.folder, session.settings, address="daqmx:Dev1")
-    status = HighVoltageStatus(again)
-    assert status.state is HighVoltage.UNKNOWN
+#: Another window, which is killed in a run on a card.
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+from dearig.window.high_voltage.status import HighVoltageStatus
+from dearig.window.session.state import Session
+application = QApplication([])
+settings = QSettings(sys.argv[1], QSettings.Format.IniFormat)
+sessions = [Session(Path(), settings, address=address) for address in sys.argv[2:]]
+statuses = [HighVoltageStatus(session) for session in sessions]
+for status in statuses:
+    status.run_begins()
+print("playing", flush=True)
+sys.stdin.read(1)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_window_that_was_killed_in_a_run_is_told_at_the_next_start(session: Session) -> None:
+    settings = session.settings
+    settings.sync()
+    killed = subprocess.Popen(
+        [sys.executable, "-c", KILLED, settings.fileName(), "daqmx:Dev1", "daqmx:Dev2"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert killed.stdout is not None
+    assert killed.stdout.readline().strip() == "playing"
+    settings.sync()
+    # while it plays, nothing has ended
+    assert HighVoltageStatus(session).alarm is None
+    killed.communicate("k")
+    # on the simulated rig that a start begins with, before any card is chosen
+    status = HighVoltageStatus(session)
     assert status.alarm is not None
-    assert "ended during what was started" in status.alarm.headline
-    assert again.blocks
+    assert status.alarm.text.startswith(
+        "The program ended during what was started on daqmx:Dev1 at "
+    )
+    assert status.state is HighVoltage.NOT_CONTACTED  # of the simulated rig
+    assert session.blocks
+    session.set_address("daqmx:Dev1")
+    assert status.state is HighVoltage.UNKNOWN
     status.acknowledge("Ada")
-    assert not again.blocks
-    third = Session(session.folder, session.settings, address="daqmx:Dev1")
-    assert HighVoltageStatus(third).alarm is None
-    # a run that ends well leaves nothing
-    first.run_begins()
-    first.run_ended(None)
-    assert HighVoltageStatus(third).alarm is None
+    assert status.alarm is not None  # that of the other card
+    assert "on daqmx:Dev2" in status.alarm.text
+    status.acknowledge("Ada")
+    assert not session.blocks
+    again = Session(session.folder, settings, address="daqmx:Dev1")
+    assert HighVoltageStatus(again).alarm is None
+
+
+def test_a_run_on_a_card_that_ends_well_leaves_nothing(session: Session) -> None:
+    session.set_address("daqmx:Dev1")
+    status = HighVoltageStatus(session)
+    status.run_begins()
+    status.run_ended(None)
+    assert HighVoltageStatus(session).alarm is None
 
 
 def test_an_alarm_is_not_released_without_a_name(session: Session) -> None:

@@ -18,7 +18,7 @@ from dearig.window.recordings.page import RecordingsPage
 from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
-from tests.window.conftest import SHORT
+from tests.window.conftest import SHORT, press
 from tests.window.run.test_stories import RUN_MS, click, seconds
 
 LONG = SHORT.replace("frequency_Hz = 2.0", "frequency_Hz = 0.05")
@@ -33,8 +33,8 @@ def going(
     page.operator.setText("Ada")
     plan_of(LONG)
     page.paced.setChecked(True)
-    click(qtbot, page.arm_button)
-    click(qtbot, page.start_button)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     qtbot.waitUntil(lambda: seconds(page) > 0.2, timeout=RUN_MS)
     yield page
     page.stop()  # once more: 0 V at once
@@ -49,7 +49,7 @@ def marks_of(qtbot: QtBot, page: RunPage) -> tuple[Mark, ...]:
     return marks_in(open_recording(ended.args[0]).events)
 
 
-def press(qtbot: QtBot, window: MainWindow, key: Qt.Key) -> None:
+def stroke(qtbot: QtBot, window: MainWindow, key: Qt.Key) -> None:
     focused = window.focusWidget()
     assert isinstance(focused, QWidget)
     qtbot.keyClick(focused, key)
@@ -60,13 +60,13 @@ def test_m_sets_a_mark_and_the_field_takes_its_note(
 ) -> None:
     bar = going.display.mark_bar
     before = seconds(going)
-    press(qtbot, window, Qt.Key.Key_M)
+    stroke(qtbot, window, Qt.Key.Key_M)
     assert bar.note.hasFocus()
     assert bar.note.placeholderText() == "Note on mark 1: Enter keeps it, Esc stops the run"
     qtbot.keyClicks(bar.note, "a spark, my left hand edge")  # with an M and spaces in it
     qtbot.keyClick(bar.note, Qt.Key.Key_Return)
     assert going.stop_button.hasFocus()
-    press(qtbot, window, Qt.Key.Key_M)
+    stroke(qtbot, window, Qt.Key.Key_M)
     qtbot.waitUntil(lambda: "mark 2" in going.plots.marks, timeout=RUN_MS)
     assert going.plots.marks == ["a spark, my left hand edge", "mark 2"]
     assert going.runner.running
@@ -94,7 +94,7 @@ def test_a_note_without_a_mark_sets_one_and_text_fields_keep_their_letters(
     window.show_page(window.page(RecordingsPage))
     window.show_page(going)
     note = going.display.mark_bar.note
-    press(qtbot, window, Qt.Key.Key_N)
+    stroke(qtbot, window, Qt.Key.Key_N)
     assert note.hasFocus()
     qtbot.keyClicks(note, "lamp on")
     assert note.text() == "lamp on"
@@ -105,7 +105,7 @@ def test_a_note_without_a_mark_sets_one_and_text_fields_keep_their_letters(
 def test_a_note_that_is_not_finished_when_the_run_ends_is_kept(
     qtbot: QtBot, window: MainWindow, going: RunPage
 ) -> None:
-    press(qtbot, window, Qt.Key.Key_M)
+    stroke(qtbot, window, Qt.Key.Key_M)
     qtbot.keyClicks(going.display.mark_bar.note, "it tea")
     assert [m.note for m in marks_of(qtbot, going)] == ["it tea"]
     assert going.display.mark_bar.note.text() == ""
@@ -125,10 +125,10 @@ def test_alarms_of_a_run_have_time_level_and_acknowledgement(
 ) -> None:
     plan_of(SHORT)
     run_page.faults = FaultPlan.parse(("arc@0.45",))
-    click(qtbot, run_page.arm_button)
+    press(qtbot, run_page.arm_button)
     began = datetime.now().astimezone()
     with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):
-        click(qtbot, run_page.start_button)
+        press(qtbot, run_page.start_button)
     alarms, table, bar = run_page.alarms, run_page.display.table, run_page.display.acknowledge
     trip = next(a for a in alarms.alarms if "interlock" in a.message)
     assert began <= trip.at <= datetime.now().astimezone()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -16,7 +17,7 @@ from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
-from tests.window.conftest import SHORT
+from tests.window.conftest import SHORT, press
 
 LEFT = Qt.MouseButton.LeftButton
 KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Space)
@@ -41,6 +42,10 @@ def focus(window: MainWindow, place: QWidget) -> None:
     place.setFocus()
 
 
+def writes(place: QWidget) -> bool:
+    return isinstance(place, QLineEdit)
+
+
 def test_while_armed_a_stop_key_disarms_whatever_has_the_focus(
     qtbot: QtBot, window: MainWindow
 ) -> None:
@@ -49,63 +54,145 @@ def test_while_armed_a_stop_key_disarms_whatever_has_the_focus(
     checked = page.paced.isChecked()
     for place in places(window):
         for key in KEYS:
+            if key == Qt.Key.Key_Space and writes(place):
+                continue
             window.show_page(page)
-            qtbot.mouseClick(page.arm_button, LEFT)
+            press(qtbot, page.arm_button)
             assert page.runner.armed
             focus(window, place)
+            title = window.stack.currentWidget().title
             qtbot.keyClick(place, key)
-            assert page.runner.state is HighVoltage.NOT_CONTACTED, (place, key)
+            assert not page.runner.armed, (place, key)
             assert not page.start_button.isEnabled()
             assert not page.runner.running
-    assert page.operator.text() == "Ada"  # no space was written
+            name = "Esc" if key == Qt.Key.Key_Escape else "Space"
+            assert f"disarmed by key {name} on {title}, " in window.bar.detail.text()
+    assert page.operator.text() == "Ada"
     assert page.paced.isChecked() == checked
 
 
-@pytest.mark.parametrize("key", KEYS)
-def test_in_a_run_a_stop_key_stops_while_a_field_has_the_focus(
-    qtbot: QtBot, quick_ramp: Session, window: MainWindow, key: Qt.Key
-) -> None:
-    page, search = window.run_page, QLineEdit(window)
-    search.show()
+def begin(qtbot: QtBot, window: MainWindow) -> None:
+    """Begin a run that takes its time."""
+    page = window.run_page
     page.paced.setChecked(True)
-    qtbot.mouseClick(page.arm_button, LEFT)
-    qtbot.mouseClick(page.start_button, LEFT)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
+
+
+def test_a_run_that_a_key_stops_says_which_one_and_where(
+    qtbot: QtBot, quick_ramp: Session, window: MainWindow
+) -> None:
+    page, status = window.run_page, window.run_page.runner.status
+    for key, name, other in (
+        (Qt.Key.Key_Escape, "Esc", window.page(RecordingsPage)),
+        (Qt.Key.Key_Space, "Space", window.page(StudyPage)),
+    ):
+        window.show_page(page)
+        begin(qtbot, window)
+        window.show_page(other)
+        other.setFocus()
+        with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
+            qtbot.keyClick(other, key)
+            during = window.bar.detail.text()
+        assert ended.args[0].headline == "Stopped"
+        assert f"stopped by key {name} on {other.title}, " in during
+        assert f"stopped by key {name} on {other.title}, " in window.bar.detail.text()
+    # what is said belongs to one run
+    window.show_page(page)
+    press(qtbot, page.arm_button)
+    assert status.cause == ""
+
+
+def test_every_other_stop_is_named_too(
+    qtbot: QtBot, quick_ramp: Session, window: MainWindow
+) -> None:
+    page, bar = window.run_page, window.bar
+    begin(qtbot, window)
     window.show_page(window.page(StudyPage))
-    search.setFocus()
-    with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
-        qtbot.keyClick(search, key)
-    assert ended.args[0].headline == "Stopped"
-    assert search.text() == ""
+    with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS):
+        qtbot.mouseClick(bar.stop_button, LEFT)
+    assert "stopped by STOP on Study, " in bar.detail.text()
+    window.show_page(page)
+    press(qtbot, page.arm_button)
+    quick_ramp.block("test", "a test")
+    assert "disarmed: something blocks arming, " in bar.detail.text()
+    quick_ramp.unblock("test")
+    press(qtbot, page.arm_button)
+    quick_ramp.set_sequence(SHORT, Path())
+    assert "disarmed: the sequence was changed, " in bar.detail.text()
 
 
-def test_a_space_of_an_input_method_stops_too(qtbot: QtBot, window: MainWindow) -> None:
-    page = window.run_page
-    qtbot.mouseClick(page.arm_button, LEFT)
-    page.operator.setFocus()
-    typed = QInputMethodEvent()
-    typed.setCommitString(" ")
-    QApplication.sendEvent(page.operator, typed)
-    assert not page.runner.armed
-    assert " " not in page.operator.text()
+def test_a_space_writes_where_a_text_field_has_the_focus(
+    qtbot: QtBot, quick_ramp: Session, window: MainWindow
+) -> None:
+    page, search = window.run_page, window.page(RecordingsPage).filter
+    begin(qtbot, window)
+    note = page.display.mark_bar.note
+    for other, field in ((page, note), (window.page(RecordingsPage), search)):
+        window.show_page(other)
+        field.setFocus()
+        qtbot.keyClicks(field, " lamp  on ")
+        assert field.text() == " lamp  on "
+        typed = QInputMethodEvent()
+        typed.setCommitString(" ")
+        QApplication.sendEvent(field, typed)
+        assert field.text() == " lamp  on  "
+    assert page.runner.state is HighVoltage.ON
+    page.stop()
+    qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)
 
 
-@pytest.mark.parametrize("text", ["", "two "])
-def test_a_note_takes_a_space_after_a_word_and_no_other(
-    qtbot: QtBot, quick_ramp: Session, window: MainWindow, text: str
+def test_a_space_does_not_write_where_nothing_can_be_written(
+    qtbot: QtBot, window: MainWindow
 ) -> None:
     page = window.run_page
-    page.paced.setChecked(True)
-    qtbot.mouseClick(page.arm_button, LEFT)
-    qtbot.mouseClick(page.start_button, LEFT)
-    note = page.display.mark_bar.note
-    note.setFocus()
-    qtbot.keyClicks(note, "lamp on")
-    assert note.text() == "lamp on"
+    press(qtbot, page.arm_button)
+    page.operator.setReadOnly(True)
+    page.operator.setFocus()
+    qtbot.keyClick(page.operator, Qt.Key.Key_Space)
+    assert not page.runner.armed
+
+
+def test_esc_closes_what_is_open_before_it_stops(
+    qtbot: QtBot, quick_ramp: Session, window: MainWindow
+) -> None:
+    page, search = window.run_page, window.page(RecordingsPage).filter
+    begin(qtbot, window)
+    # the guide
+    window.show_guide()
+    guide = window._guide
+    qtbot.keyClick(guide.text, Qt.Key.Key_Escape)
+    assert not guide.isVisible()
+    # a list, and the repetitions of the key that has closed it
+    box = page.display.view.span
+    box.setFocus()
+    box.showPopup()
+    qtbot.waitUntil(lambda: QApplication.activePopupWidget() is not None)
+    for repeated in (False, True, True):
+        target = QApplication.activePopupWidget() or window
+        QCoreApplication.sendEvent(
+            target,
+            QKeyEvent(
+                QEvent.Type.KeyPress, Qt.Key.Key_Escape.value,
+                Qt.KeyboardModifier.NoModifier, "", repeated,
+            ),
+        )  # fmt: skip
+    assert QApplication.activePopupWidget() is None
+    # a search text
+    window.show_page(window.page(RecordingsPage))
+    search.setFocus()
+    search.setText("film 7")
+    qtbot.keyClick(search, Qt.Key.Key_Escape)
+    assert search.text() == ""
+    # a cell that is edited
+    window.show_page(window.sequence_page)
     assert page.runner.state is HighVoltage.ON
-    note.setText(text)
-    with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
-        qtbot.keyClick(note, Qt.Key.Key_Space)
-    assert ended.args[0].headline == "Stopped"
+    # and where nothing is open, the run
+    window.show_page(window.page(RecordingsPage))
+    search.setFocus()
+    with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS):
+        qtbot.keyClick(search, Qt.Key.Key_Escape)
+    assert "stopped by key Esc on Recordings, " in window.bar.detail.text()
 
 
 def test_a_field_takes_spaces_while_nothing_is_armed(qtbot: QtBot, window: MainWindow) -> None:
@@ -121,7 +208,7 @@ def test_no_key_but_its_own_starts(qtbot: QtBot, window: MainWindow) -> None:
         page.arm_button.setFocus()
         qtbot.keyClick(page.arm_button, key)
         assert not page.runner.armed
-        qtbot.mouseClick(page.arm_button, LEFT)
+        press(qtbot, page.arm_button)
         page.start_button.setFocus()
         qtbot.keyClick(page.start_button, key)
         assert not page.runner.running
@@ -139,17 +226,17 @@ def test_no_key_but_its_own_starts(qtbot: QtBot, window: MainWindow) -> None:
 
 
 def test_the_whole_stroke_of_a_stop_key_is_taken(qtbot: QtBot, window: MainWindow) -> None:
-    """A key that is held repeats itself after it has disarmed, and would write into the field."""
+    """A key that is held repeats itself after it has disarmed, and would press what has focus."""
     page = window.run_page
-    page.operator.setText("")
-    qtbot.mouseClick(page.arm_button, LEFT)
-    page.operator.setFocus()
+    checked = page.paced.isChecked()
+    press(qtbot, page.arm_button)
+    page.paced.setFocus()
 
     def send(kind: QEvent.Type, repeated: bool) -> None:
         event = QKeyEvent(
             kind, Qt.Key.Key_Space.value, Qt.KeyboardModifier.NoModifier, " ", repeated
         )
-        QCoreApplication.sendEvent(page.operator, event)
+        QCoreApplication.sendEvent(page.paced, event)
 
     send(QEvent.Type.KeyPress, False)
     assert not page.runner.armed
@@ -157,9 +244,10 @@ def test_the_whole_stroke_of_a_stop_key_is_taken(qtbot: QtBot, window: MainWindo
         send(QEvent.Type.KeyRelease, True)
         send(QEvent.Type.KeyPress, True)
     send(QEvent.Type.KeyRelease, False)
-    assert page.operator.text() == ""
+    assert page.paced.isChecked() == checked
     send(QEvent.Type.KeyPress, False)  # the next one is a space again
-    assert page.operator.text() == " "
+    send(QEvent.Type.KeyRelease, False)
+    assert page.paced.isChecked() != checked
 
 
 def test_a_key_that_is_held_does_not_skip_the_ramp(
@@ -168,8 +256,8 @@ def test_a_key_that_is_held_does_not_skip_the_ramp(
     page = window.run_page
     plan_of(SHORT)
     page.paced.setChecked(True)
-    qtbot.mouseClick(page.arm_button, LEFT)
-    qtbot.mouseClick(page.start_button, LEFT)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
         for repeated in (False, True, True):
             QCoreApplication.sendEvent(
@@ -188,7 +276,7 @@ def test_the_time_to_start_is_counted_down(
     now = SimpleNamespace(at=100.0)
     monkeypatch.setattr("dearig.window.high_voltage.status._now", lambda: now.at)
     page = window.run_page
-    qtbot.mouseClick(page.arm_button, LEFT)
+    press(qtbot, page.arm_button)
     assert "disarms in 30 s" in window.bar.badge.detail
     now.at += 12.0
     qtbot.waitUntil(lambda: "disarms in 18 s" in window.bar.badge.detail)

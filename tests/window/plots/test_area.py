@@ -534,3 +534,12 @@ def test_copies_are_a_picture_and_a_table(shown: Shown) -> None:
     assert clipboard.text().splitlines()[0].split("\t")[:2] == [
         "Time (s)", "Voltage, commanded (kV)",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("height", [700, 400, 300, 220])
+def test_labels_of_low_plots_do_not_run_into_each_other(shown: Shown, height: int) -> None:
+    shown.area.resize(900, height)
+    QApplication.processEvents()
+    labels = [plot.getAxis("left").label for plot in (shown.voltage, shown.residual)]
+    above, below = (label.mapRectToScene(label.boundingRect()) for label in labels)
+    assert above.bottom() <= below.top() + 8.0  # the margin of a document, above and below

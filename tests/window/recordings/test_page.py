@@ -232,3 +232,12 @@ def test_nothing_of_one_folder_is_said_of_the_next(session, keep, qtbot, tmp_pat
     session.set_folder(fresh)
     qtbot.waitUntil(lambda: page.message.isHidden(), timeout=_PATIENCE)
     assert page.details.item(0, 1).text().startswith("Select a recording")
+
+
+def test_what_is_being_read_says_so(session: Session, keep: Keep, qtbot: QtBot) -> None:
+    made(session.folder, "first")
+    page = open_page(session, keep, qtbot)
+    page.choose([session.folder / "first.h5"])
+    qtbot.waitUntil(lambda: "reading curves …" in page.count.text(), timeout=_PATIENCE)
+    drawn(page, qtbot, "first")
+    assert "reading" not in page.count.text()

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import RigFile
@@ -18,7 +17,7 @@ from dearig.sim_backend.clock import PacedClock
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.run.page import RunPage
 from tests.tools.daqmx import served
-from tests.window.conftest import SHORT
+from tests.window.conftest import SHORT, press
 
 RIG_FILE = RigFile.model_validate(
     {
@@ -58,9 +57,9 @@ def play(qtbot: QtBot, page: RunPage, port: int) -> None:
     session.set_address(f"daqmx:Dev1@127.0.0.1:{port}")
     qtbot.waitUntil(lambda: page.arm_button.isEnabled(), timeout=WAIT)
     assert page.paced.isHidden()  # a real rig takes its time
-    qtbot.mouseClick(page.arm_button, Qt.MouseButton.LeftButton)
+    press(qtbot, page.arm_button)
     with qtbot.waitSignal(page.runner.ended, timeout=WAIT):
-        qtbot.mouseClick(page.start_button, Qt.MouseButton.LeftButton)
+        press(qtbot, page.start_button)
 
 
 def test_a_run_on_a_card(qtbot: QtBot, run_page: RunPage) -> None:
@@ -83,5 +82,5 @@ def test_a_rig_that_is_unplugged_in_mid_run(qtbot: QtBot, run_page: RunPage, fau
     assert "by hand" in run_page.badge.toolTip()
     # and it is not known any better because somebody armed and thought again
     for _ in range(2):
-        qtbot.mouseClick(run_page.arm_button, Qt.MouseButton.LeftButton)
+        press(qtbot, run_page.arm_button)
     assert run_page.runner.state is HighVoltage.UNKNOWN

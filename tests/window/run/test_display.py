@@ -18,7 +18,7 @@ from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.run.page import RunPage
 from dearig.window.sequence.planner import make_preview
 from dearig.window.session.state import Session
-from tests.window.conftest import SHORT
+from tests.window.conftest import SHORT, press
 from tests.window.run.test_stories import RUN_MS, click, play, seconds
 
 OTHER = SHORT.replace("one lobe", "smaller").replace("6.0", "2.5")
@@ -49,7 +49,7 @@ def test_before_a_run_the_plots_show_what_will_be_played(
     qtbot.waitUntil(lambda: drawn(run_page, "monitor").size > 0)
     assert drawn(run_page, "monitor").max() == pytest.approx(6.0, abs=0.1)
     assert view.words.text().startswith("Last run: one lobe")
-    click(qtbot, run_page.arm_button)  # falls back to what will be played
+    press(qtbot, run_page.arm_button)  # falls back to what will be played
     assert view.shows_plan
     assert view.words.text() == "Planned: smaller, peak 2.50 kV, 1.0 s"
     assert drawn(run_page, "monitor").size == 0
@@ -89,7 +89,7 @@ def test_start_is_refused_where_other_curves_are_drawn_than_would_be_played(
     qtbot: QtBot, run_page: RunPage, plan_of: Callable[[str], None], tmp_path: Path
 ) -> None:
     plan_of(SHORT)
-    click(qtbot, run_page.arm_button)
+    press(qtbot, run_page.arm_button)
     other = make_preview(OTHER, Path(), run_page.session.rig_file)
     run_page.plots.show_prediction(other)  # by whatever error
     run_page.start()
@@ -102,7 +102,8 @@ def test_start_is_refused_where_other_curves_are_drawn_than_would_be_played(
     preview = run_page.session.preview
     assert preview is not None
     run_page.session.preview = replace(preview, loaded=other.loaded)
-    click(qtbot, run_page.arm_button)
+    press(qtbot, run_page.arm_button)
+    qtbot.waitUntil(lambda: run_page.runner.status.may_start)
     with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):
         run_page.start()
     assert run_page.result.text().startswith("Refused")
@@ -153,9 +154,9 @@ def test_an_arc_stands_out_in_the_current_and_is_an_alarm(
     plan_of(SHORT)
     run_page.operator.setText("Ada")
     run_page.faults = FaultPlan.parse(("arc@0.45",))
-    click(qtbot, run_page.arm_button)
+    press(qtbot, run_page.arm_button)
     with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):
-        click(qtbot, run_page.start_button)
+        press(qtbot, run_page.start_button)
     qtbot.waitUntil(lambda: drawn(run_page, "current").size > 0)
     assert np.abs(drawn(run_page, "current")).max() > 20.0  # mA, above the trip level
     _, high = run_page.plots.y_range("current")
@@ -189,8 +190,8 @@ def test_scrolling_back_holds_the_plots_while_the_run_goes_on(
     view, plots = run_page.display.view, run_page.plots
     view.span.setCurrentIndex(0)  # the last 2 s
     view.span.activated.emit(0)
-    click(qtbot, run_page.arm_button)
-    click(qtbot, run_page.start_button)
+    press(qtbot, run_page.arm_button)
+    press(qtbot, run_page.start_button)
     qtbot.waitUntil(lambda: seconds(run_page) > 2.6, timeout=RUN_MS)
     follow = plots.area.tools.buttons[plots.area.tools.follow]
     assert not follow.isVisible()

@@ -30,7 +30,7 @@ from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from tests.deep import mostly_deep
-from tests.window.conftest import SHORT
+from tests.window.conftest import SHORT, press
 
 LEFT = Qt.MouseButton.LeftButton
 RUN_MS = 60_000
@@ -43,9 +43,9 @@ def click(qtbot: QtBot, widget: QPushButton) -> None:
 
 def play(qtbot: QtBot, page: RunPage) -> Path:
     """Arm, start, and wait for the end; the recording."""
-    click(qtbot, page.arm_button)
+    press(qtbot, page.arm_button)
     with qtbot.waitSignal(page.session.recorded, timeout=RUN_MS) as ended:
-        click(qtbot, page.start_button)
+        press(qtbot, page.start_button)
     path: Path = ended.args[0]
     return path
 
@@ -167,8 +167,8 @@ def test_stop_ends_any_segment(
         + ("" if ends else BACK)
     )
     page.paced.setChecked(True)
-    click(qtbot, page.arm_button)
-    click(qtbot, page.start_button)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     qtbot.waitUntil(lambda: seconds(page) >= 0.6, timeout=RUN_MS)
     assert page.runner.state is HighVoltage.ON
     if kind != "lead-in":
@@ -189,8 +189,8 @@ def test_stop_ends_any_segment(
 def test_stop_by_key_from_another_page(qtbot: QtBot, window: MainWindow, key: Qt.Key) -> None:
     page = window.run_page
     page.paced.setChecked(True)
-    click(qtbot, page.arm_button)
-    click(qtbot, page.start_button)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     window.show_page(window.page(RigPage))
     qtbot.waitUntil(lambda: seconds(page) > 0.0, timeout=RUN_MS)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
@@ -201,8 +201,8 @@ def test_stop_by_key_from_another_page(qtbot: QtBot, window: MainWindow, key: Qt
 def test_a_second_stop_is_0_volts_at_once(qtbot: QtBot, window: MainWindow) -> None:
     page = window.run_page
     page.paced.setChecked(True)
-    click(qtbot, page.arm_button)
-    click(qtbot, page.start_button)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     qtbot.waitUntil(lambda: seconds(page) > 2.3, timeout=RUN_MS)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
         click(qtbot, page.stop_button)
@@ -246,9 +246,9 @@ def test_a_rig_that_is_not_there(qtbot: QtBot, run_page: RunPage) -> None:
     page = run_page
     run_page.session.set_address("daqmx:Dev1")
     qtbot.waitUntil(lambda: run_page.session.preview is not None, timeout=RUN_MS)
-    click(qtbot, page.arm_button)
+    press(qtbot, page.arm_button)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS):
-        click(qtbot, page.start_button)
+        press(qtbot, page.start_button)
     assert "no film is declared" in page.result.text()
     assert page.show_button.isHidden()
     assert page.arm_button.isEnabled()
@@ -258,9 +258,9 @@ def test_a_folder_that_cannot_be_used(qtbot: QtBot, run_page: RunPage, tmp_path:
     (tmp_path / "file").write_text("")
     run_page.session.set_folder(tmp_path / "file" / "folder")
     page = run_page
-    click(qtbot, page.arm_button)
+    press(qtbot, page.arm_button)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS):
-        click(qtbot, page.start_button)
+        press(qtbot, page.start_button)
     assert "choose another one" in page.result.text()
     assert page.runner.state is HighVoltage.NOT_CONTACTED
 
@@ -272,10 +272,10 @@ def test_a_defect_of_the_program_leaves_nothing_taken_for_safe(
         raise RuntimeError("a defect")
 
     monkeypatch.setattr("dearig.window.run.runner.record", broken)
-    click(qtbot, run_page.arm_button)
+    press(qtbot, run_page.arm_button)
     with qtbot.captureExceptions() as caught:
         with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):
-            click(qtbot, run_page.start_button)
+            press(qtbot, run_page.start_button)
         qtbot.waitUntil(lambda: bool(caught))
     assert "an error in the program" in run_page.result.text()
     assert run_page.runner.state is HighVoltage.UNKNOWN
@@ -317,8 +317,8 @@ def test_closing_in_mid_run_makes_safe_whatever_the_answer(
 ) -> None:
     page = window.run_page
     page.paced.setChecked(True)
-    click(qtbot, page.arm_button)
-    click(qtbot, page.start_button)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     qtbot.waitUntil(lambda: seconds(page) > 0.2, timeout=RUN_MS)
     answer(button)
     window.close()
@@ -337,14 +337,14 @@ def test_what_was_armed_is_disarmed_when_the_sequence_changes(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:
     page = window.run_page
-    click(qtbot, page.arm_button)
+    press(qtbot, page.arm_button)
     assert page.runner.state is HighVoltage.ARMED
     assert window.bar.badge.state is HighVoltage.ARMED  # in sight from every page
     plan_of(SHORT)
     assert page.runner.state is HighVoltage.NOT_CONTACTED
     assert not page.start_button.isEnabled()
-    click(qtbot, page.arm_button)
-    click(qtbot, page.arm_button)  # taken back by hand
+    press(qtbot, page.arm_button)
+    press(qtbot, page.arm_button)  # taken back by hand
     assert page.runner.state is HighVoltage.NOT_CONTACTED
 
 
@@ -353,8 +353,8 @@ def test_another_model_in_mid_run_starts_from_its_beginning(
 ) -> None:
     page, session = run_page, run_page.session
     page.paced.setChecked(True)
-    click(qtbot, page.arm_button)
-    click(qtbot, page.start_button)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
     qtbot.waitUntil(lambda: seconds(page) > 0.5, timeout=RUN_MS)
     page.overlays.models[1].setCurrentIndex(1)
     page.overlays.models[1].activated.emit(1)
@@ -433,6 +433,7 @@ def test_nothing_is_cut_in_the_smallest_window(
     for page in window.pages:
         window.show_page(page)
         qtbot.waitUntil(page.isVisible)
+        qtbot.wait(1)  # what is laid out later is laid out now
         for made in page.findChildren(QLabel) + page.findChildren(QAbstractButton):
             wraps = isinstance(made, QLabel) and made.wordWrap()
             if made.isVisible() and made.text() and not wraps:

@@ -27,6 +27,7 @@ from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
 from tests.report.test_study_file import made as study_on_paper
 from tests.tools.diagnosis import EXPERIMENT, diagnose_outcome
+from tests.window.conftest import press
 from tests.window.made_recordings import LOBES, SLOW_RIG, made, of_rig
 
 _PATIENCE = 240_000  # ms; a search on a machine that may be busy
@@ -223,9 +224,9 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
         timeout=_PATIENCE,
     )
     assert run.runner.state is HighVoltage.NOT_CONTACTED
-    click(qtbot, run.arm_button)
+    press(qtbot, run.arm_button)
     with qtbot.waitSignal(session.recorded, timeout=_PATIENCE) as told:
-        click(qtbot, run.start_button)
+        press(qtbot, run.start_button)
     recorded: Path = told.args[0]
     before, after = assess(recorded, None).errors, assess(recorded, found.model).errors
     assert before is not None
