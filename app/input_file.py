@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import io
+import json
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any
 
 from dearig.errors import InputError
 
-__all__ = ["open_input", "read_input", "why_no_file"]
+__all__ = ["open_input", "parse_json", "read_input", "why_no_file"]
 
 #: What an entry of a folder may be instead of a file.
 _KINDS = {
@@ -43,7 +46,7 @@ def _not_regular(mode: int) -> str:
     return "is a folder" if stat.S_ISDIR(mode) else f"is {kind}, not a file"
 
 
-def open_input(path: Path, what: str = "") -> BinaryIO:
+def open_input(path: Path, what: str = "") -> io.BufferedReader:
     """Open the file at ``path`` for reading, without waiting for anything.
 
     Raises ``InputError``; ``what`` it should be ("rig file") comes before its name there.
@@ -81,3 +84,21 @@ def read_input(path: Path, what: str, most: int) -> bytes:
             f"that it is the right file"
         )
     return raw
+
+
+def parse_json(text: str | bytes, number: Callable[[str], float] | None = None) -> Any:
+    """Return the value of a JSON text; ``number`` reads what is not an integer.
+
+    Raises ``ValueError``, also for a key that is there twice: which of its values a program takes
+    differs from one to the next.
+    """
+    return json.loads(text, object_pairs_hook=_once, parse_constant=number, parse_float=number)
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the key {twice[:80]!r} is there more than once")
+    return found

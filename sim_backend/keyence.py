@@ -55,7 +55,6 @@ class SimulatedController:
         self._behaviour = behaviour
         self._faults = (faults or FaultPlan()).of(FaultKind.SERIAL_GARBAGE)
         self._noise = random.Random(seed)  # noqa: S311  (noise on a line, no secret)
-        self._zero = 0.0
         self._held = b""
         self._pending: list[tuple[float, bytes]] = []
 
@@ -109,7 +108,7 @@ class SimulatedController:
                 return 51
             self.setting_mode = wanted
             return [main]
-        if main not in ("PR", "MS", "VS", "WS", "SR"):
+        if main not in ("PR", "MS", "SR"):
             return 50
         if self.setting_mode is not (main == "SR"):
             return 51
@@ -121,11 +120,7 @@ class SimulatedController:
             return 61
         if parameters[0] != f"{self._settings.output:02d}":
             return 62
-        if main == "MS":
-            return ["MS", *parameters, self._value(now)]
-        seen = self._reading(now)
-        self._zero = seen if main == "VS" and seen is not None else 0.0
-        return [main]
+        return [main, *parameters, self._value(now)]
 
     def _value(self, now: float) -> str:
         """Return the measured value as text: a sign and seven characters."""
@@ -134,7 +129,7 @@ class SimulatedController:
             return "XXXXXXXX"
         if abs(seen) > self._settings.range_mm * 1e-3:
             return "+FFFFFFF" if seen > 0.0 else "-FFFFFFF"
-        return self._number(seen - self._zero)
+        return self._number(seen)
 
     def _number(self, metres: float) -> str:
         return f"{metres * 1e3:+08.3f}"

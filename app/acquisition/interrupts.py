@@ -8,7 +8,7 @@ import weakref
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-__all__ = ["Interrupts", "terminal_closed"]
+__all__ = ["Interrupts", "ends_program", "ignore_interrupts", "terminal_closed"]
 
 # the voltage must not stay on when a terminal is closed or a service stopped
 _REASONS = {
@@ -22,6 +22,21 @@ _OPERATOR, _CLOSED = _REASONS["SIGINT"], _REASONS["SIGHUP"]
 _Handler = Callable[[int, FrameType | None], object] | int | None
 
 _runs: weakref.WeakSet[Interrupts] = weakref.WeakSet()
+
+
+_ends_program = False
+
+
+def ends_program() -> None:
+    """Let the end of a run by ctrl-C be the end of this program: further ones are ignored."""
+    global _ends_program
+    _ends_program = True
+
+
+def ignore_interrupts() -> None:
+    """Ignore ctrl-C from now on, so that the last sentence is written."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def terminal_closed() -> None:
@@ -116,7 +131,10 @@ class Interrupts:
         """Restore the handlers that were there before."""
         _runs.discard(self)
         for number, before in self._before.items():
-            signal.signal(number, before)
+            # ctrl-C that is held down must not break off what follows: the rig is closed, and the
+            # operator is told of its output
+            ignored = _ends_program and self._asked and number == signal.SIGINT
+            signal.signal(number, signal.SIG_IGN if ignored else before)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002
         again, reason = self._asked, _REASONS[signal.Signals(number).name]

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from dearig.errors import InputError
-from dearig.input_file import read_input
+from dearig.input_file import parse_json, read_input
 from dearig.recording.content.layout import iso_time
 from dearig.recording.files import in_words
 from dearig.recording.lock import lock_existing
@@ -48,7 +48,7 @@ def read_lines(path: Path, tolerant: bool = False) -> list[dict[str, Any]]:
     for i, line in enumerate(whole.splitlines()):
         entry: Any = None
         with contextlib.suppress(ValueError, RecursionError):
-            entry = json.loads(line, parse_constant=_finite, parse_float=_finite)
+            entry = parse_json(line, _finite)
         if not isinstance(entry, dict) or not isinstance(entry.get("event"), str):
             if not tolerant:
                 raise InputError(

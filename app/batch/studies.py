@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from dearig.batch.table_file import write_csv, write_parquet
 from dearig.config.modelfile import load_model
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
-from dearig.input_file import read_input
+from dearig.input_file import parse_json, read_input
 from dearig.progress import Progress, quiet
 from dearig.recording.files import in_words
 from dearig.recording.json_file import write_json
@@ -32,6 +31,7 @@ log = logging.getLogger(__name__)
 CACHED = "dearig-study-row/1"
 #: Recordings of a study, at most, and bytes of a list of them.
 _MOST, _LIST_BYTES = 100_000, 2**24
+_ROW_BYTES = 2**26  # of a row in the cache, at most, as of the report's file
 _LISTS = (".txt", ".csv", ".list")
 
 
@@ -299,8 +299,8 @@ def _keep(path: Path, row: Row) -> None:
 def _kept(path: Path) -> Row | None:
     """Return the row in the cache; None where there is none, or a damaged one."""
     try:
-        found = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        found = parse_json(read_input(path, "result of a study", _ROW_BYTES))
+    except (InputError, ValueError, RecursionError):
         return None
     if not isinstance(found, dict) or found.get("format") != CACHED:
         return None

@@ -156,9 +156,9 @@ def identify(
         SpringChoice,
         typer.Option(
             help="Strain energy of the equilibrium spring; choose fits each and keeps the most "
-            "probable one."
+            "probable one.",
         ),
-    ] = SpringChoice.gent,
+    ] = "gent",
     branch_spring: BranchSpring = None,
     effects_of: Annotated[
         Path | None,
@@ -206,8 +206,8 @@ def identify(
             validation=others,
             method=method.value,
             branches=numbers,
-            spring=spring.value,
-            branch_spring="" if branch_spring is None else branch_spring.value,
+            spring=spring,
+            branch_spring=branch_spring or "",
             effects=() if effects_of is None else load_model(effects_of).model.effects,
             drive=drive.value,
             rest_length_mm=rest_length_mm,
@@ -287,7 +287,7 @@ def diagnose(
     report: Report = None,
     model_out: ModelOut = None,
     branches: BaselineBranches = 3,
-    spring: BaselineSpring = SpringKind.gent,
+    spring: BaselineSpring = "gent",
     branch_spring: BranchSpring = None,
     drive: Drive = DriveChannel.command,
     rig_file: RigFileOption = None,
@@ -323,7 +323,7 @@ def diagnose(
         force, (*given, *others, rig_file), *optional(report), *optional(model_out), json=json
     )
     settings = None if rig_file is None else load_rig_file(rig_file)
-    of_branches = "" if branch_spring is None else branch_spring.value
+    of_branches = branch_spring or ""
     if rig is not None:
         result_folder(out, force)
         report, model_out = report or out / "report.html", model_out or out / "model.toml"
@@ -331,14 +331,14 @@ def diagnose(
         fitted, untouched = open_recordings(console, given, others, ended_early.value)
         if rig is None:
             outcome = diagnose_recordings(
-                fitted, validation=untouched, branches=branches, spring=spring.value,
+                fitted, validation=untouched, branches=branches, spring=spring,
                 branch_spring=of_branches, drive=drive.value, rig_file=settings,
                 thorough=thorough, ended_early=ended_early.value, progress=progress,
             )  # fmt: skip
         else:
             outcome = diagnose_rig(
                 rig, out, experiments=experiments, train=fitted, validation=untouched,
-                branches=branches, spring=spring.value, branch_spring=of_branches,
+                branches=branches, spring=spring, branch_spring=of_branches,
                 drive=drive.value, rig_file=settings,
                 configuration="" if rig_file is None else read_text(rig_file, "rig file"),
                 seed=seed, thorough=thorough, ended_early=ended_early.value, overwrite=force,

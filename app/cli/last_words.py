@@ -6,13 +6,14 @@ interpreter ends. An operator must find the command's sentence as the last line.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import logging
 import os
 import sys
 from typing import NoReturn, TextIO
 
-__all__ = ["LastingStream", "leave", "silence_libraries"]
+__all__ = ["LastingStream", "leave", "open_streams", "output_failure", "silence_libraries"]
 
 log = logging.getLogger(__name__)
 
@@ -21,19 +22,22 @@ _GONE = (errno.EPIPE, errno.EIO, errno.ENXIO)
 
 
 class LastingStream:
-    """Text stream that passes all to ``stream``, and drops it when its terminal has been closed.
+    """Text stream that passes all to ``stream``, and drops it once that cannot be written.
 
-    A run that goes on then is ended, as by the signal of a closed terminal.
+    What a command does, and its exit code, must not depend on who reads what it says. The first
+    error is kept in ``failure``. With ``ends_run`` a run that goes on is ended when the terminal
+    has been closed, as by the signal of a closed terminal.
     """
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO, *, ends_run: bool = False) -> None:
         self._stream = stream
-        self._gone = False
+        self._ends_run = ends_run
+        self.failure: OSError | None = None
 
     def write(self, text: str) -> int:
         """Write ``text``; returns its number of characters."""
         try:
-            if not self._gone:
+            if self.failure is None:
                 self._stream.write(text)
         except OSError as error:
             self._end(error)
@@ -42,22 +46,49 @@ class LastingStream:
     def flush(self) -> None:
         """Flush the stream."""
         try:
-            if not self._gone:
+            if self.failure is None:
                 self._stream.flush()
         except OSError as error:
             self._end(error)
 
     def _end(self, error: OSError) -> None:
-        if error.errno not in _GONE:
-            raise error
-        self._gone = True
-        log.info("standard error was closed (%s); it is written to no more", error.strerror)
-        from dearig.acquisition.interrupts import terminal_closed
+        self.failure = error
+        # what is still in its buffer goes there too, when the interpreter flushes it at the end
+        with contextlib.suppress(OSError, ValueError):
+            _discard(self._stream.fileno())
+        log.info("a stream cannot be written (%s); it is written to no more", error.strerror)
+        if self._ends_run and error.errno in _GONE:
+            from dearig.acquisition.interrupts import terminal_closed
 
-        terminal_closed()
+            terminal_closed()
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._stream, name)
+
+
+def open_streams() -> None:
+    """Open the null device in place of each standard stream that was closed at the start.
+
+    The next file that is opened would have its number, and what libraries and the guardian write
+    to the terminal would go into that file, such as a recording.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is not None:
+            continue
+        found = os.open(os.devnull, os.O_RDWR)  # the lowest number that is free
+        if found > number:
+            os.close(found)
+            found = number
+        mode = "w" if number else "r"
+        stream = open(  # noqa: SIM115  (as long as the program)
+            found, mode, encoding="utf-8", errors="backslashreplace", closefd=False
+        )
+        setattr(sys, name, stream)
+
+
+def output_failure() -> OSError | None:
+    """Return why standard output cannot be written any more, None while it can."""
+    return getattr(sys.stdout, "failure", None)
 
 
 def silence_libraries() -> None:

@@ -25,8 +25,15 @@ import typer
 from typer.exceptions import TyperException
 
 from dearig import log_file
+from dearig.acquisition.interrupts import ends_program, ignore_interrupts
 from dearig.cli import campaign, files, fit, hold, run, study, tools, track, trends, watch
-from dearig.cli.last_words import LastingStream, leave, silence_libraries
+from dearig.cli.last_words import (
+    LastingStream,
+    leave,
+    open_streams,
+    output_failure,
+    silence_libraries,
+)
 from dearig.cli.lost_interrupt import note_lost
 from dearig.cli.options import without_secrets
 from dearig.cli.output import version
@@ -96,6 +103,7 @@ class _Terminal(logging.StreamHandler[TextIO]):
 
 def main() -> None:
     """Run the command line; errors become one sentence and an exit code."""
+    open_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # characters that the terminal's encoding lacks are escaped; they raise nothing
@@ -106,7 +114,11 @@ def main() -> None:
         _printable_output(), log_file.attached() as written, _terminal(),
         _unexpected_errors_logged(written), _library_warnings_logged(),
     ):  # fmt: skip
-        status = _run(written)
+        ends_program()
+        try:
+            status = _run(written)
+        except KeyboardInterrupt:  # pressed again while the first one was answered
+            status = _interrupted()
         _await_notifications()
         if written.stream is not None:  # a command has started, not only --help
             log.info("ended with exit code %d", status)
@@ -146,8 +158,8 @@ def _library_warnings_logged() -> Iterator[None]:
 def _printable_output() -> Iterator[None]:
     """Let only printable characters through to the terminal, also those of other packages."""
     raw = sys.stdout, sys.stderr
-    sys.stdout = cast(TextIO, PrintableStream(raw[0]))
-    sys.stderr = cast(TextIO, PrintableStream(cast(TextIO, LastingStream(raw[1]))))
+    lasting = LastingStream(raw[0]), LastingStream(raw[1], ends_run=True)
+    sys.stdout, sys.stderr = (cast(TextIO, PrintableStream(cast(TextIO, s))) for s in lasting)
     try:
         yield
     finally:
@@ -192,23 +204,17 @@ def _run(written: log_file.LogFile) -> int:
     try:
         status: object = app(prog_name="dearig", standalone_mode=False)
         if status == Interrupted.exit_code:  # typer returns it for a KeyboardInterrupt
-            _say("interrupted")
+            return _interrupted()
         sys.stdout.flush()
     except DearigError as error:
-        if isinstance(error.__cause__, BrokenPipeError):
-            return _reader_left()
+        ignore_interrupts()
         _say(str(error))
         return error.exit_code
     except TyperException as error:
         _say(_usage(error))
         return InputError.exit_code
     except KeyboardInterrupt:
-        _say("interrupted")
-        return Interrupted.exit_code
-    except (BrokenPipeError, SystemExit):
-        # rich and typer both turn a broken pipe into a SystemExit; nothing else here raises one
-        # with a code that is not 0
-        return _reader_left()
+        return _interrupted()
     except Exception as error:
         exhausted = _exhausted(error)
         if exhausted:
@@ -217,7 +223,12 @@ def _run(written: log_file.LogFile) -> int:
             return DiskFault.exit_code
         _tell_unexpected(error, written)
         return DearigError.exit_code
-    return status if isinstance(status, int) else 0
+    failure = output_failure()
+    # the reader of a pipe (head, less) that has seen enough is no error
+    if status or failure is None or isinstance(failure, BrokenPipeError):
+        return status if isinstance(status, int) else 0
+    _say(_exhausted(failure) or f"standard output could not be written ({failure.strerror})")
+    return DiskFault.exit_code
 
 
 #: Errors of a system whose disk is full, over its quota or broken.
@@ -271,10 +282,11 @@ def _misread(error: Exception) -> bool:
     return True
 
 
-def _reader_left() -> int:
-    """Discard further output after the reader of a pipe (head, less) has ended: no error."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0
+def _interrupted() -> int:
+    """Say that the command was interrupted outside a run, and return its exit code."""
+    ignore_interrupts()
+    _say("interrupted")
+    return Interrupted.exit_code
 
 
 #: Wording of the libraries that read the command line, and what an operator reads instead.

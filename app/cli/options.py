@@ -7,17 +7,19 @@ import shlex
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import typer
 from typer.core import TyperCommand
 
 from dearig.errors import InputError
+from dearig.model.spring_names import SPRINGS
 
 if TYPE_CHECKING:
     from dearig.config.notify import Notify
 
 __all__ = [
+    "SPRING_KINDS",
     "Branches",
     "Drive",
     "DriveChannel",
@@ -57,31 +59,14 @@ class Method(StrEnum):
     de = "de"
 
 
-class SpringKind(StrEnum):
-    """Strain energies."""
-
-    gent = "gent"
-    neo_hookean = "neo-hookean"
-    arruda_boyce = "arruda-boyce"
-    yeoh = "yeoh"
-    mooney_rivlin = "mooney-rivlin"
-    ogden = "ogden"
-    ogden_two_terms = "ogden-two-terms"
-    extended_tube = "extended-tube"
-
-
-class SpringChoice(StrEnum):
-    """Strain energies, and their choice by the evidence."""
-
-    gent = "gent"
-    neo_hookean = "neo-hookean"
-    arruda_boyce = "arruda-boyce"
-    yeoh = "yeoh"
-    mooney_rivlin = "mooney-rivlin"
-    ogden = "ogden"
-    ogden_two_terms = "ogden-two-terms"
-    extended_tube = "extended-tube"
-    choose = "choose"
+#: Strain energies, the default first.
+SPRING_KINDS = ("gent", *(name for name in SPRINGS if name != "gent"))
+if TYPE_CHECKING:
+    SpringKind: TypeAlias = str
+    SpringChoice: TypeAlias = str
+else:
+    SpringKind = Literal[SPRING_KINDS]
+    SpringChoice = Literal[(*SPRING_KINDS, "choose")]
 
 
 class DriveChannel(StrEnum):

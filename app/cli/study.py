@@ -68,9 +68,7 @@ def study(
         typer.Option(metavar="MODEL.toml", help="The model of --do validate."),
     ] = None,
     branches: Annotated[int, typer.Option(min=1, max=10, help="Number of Maxwell branches.")] = 3,
-    spring: Annotated[
-        SpringKind, typer.Option(help="Strain energy of --do identify.")
-    ] = SpringKind.gent,
+    spring: Annotated[SpringKind, typer.Option(help="Strain energy of --do identify.")] = "gent",
     drive: Drive = DriveChannel.command,
     intervals: Annotated[bool, typer.Option(help="Compute 95 % confidence intervals.")] = True,
     ended_early: EndedEarlyOption = EndedEarly.keep,
@@ -103,7 +101,7 @@ def study(
     check_files(force, (model, *(s for s in sources if s.is_file())), json=json)
     options = with_model(
         StudyOptions(
-            do.value, branches, spring.value, drive.value, ended_early.value, intervals,
+            do.value, branches, spring, drive.value, ended_early.value, intervals,
             own=tuple(own or ()),
         ),
         model,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dearig.cli.last_words import output_failure
 from dearig.cli.options import Force, Json
 from dearig.cli.output import check_files, console_for, print_line, write_result
 from dearig.errors import InputError
@@ -137,7 +138,7 @@ def _show(view: SourceWatch, console: Console, every: float) -> None:
         with Live(
             shown, console=console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
         ) as live:
-            while not view.ended:
+            while not view.ended and output_failure() is None:
                 time.sleep(every)
                 live.update(_look(view, console), refresh=True)
     except KeyboardInterrupt:

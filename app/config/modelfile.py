@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tomli_w
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, create_model
 
 from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
 from dearig.errors import InputError
@@ -18,7 +18,7 @@ from dearig.model.errors import ModelError
 from dearig.model.film.material import Branch, Film, Load, Network, Spring
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
-from dearig.model.springs import LIMIT, SPRING_LAWS
+from dearig.model.springs import LIMIT, SPRING_LAWS, SPRINGS
 from dearig.recording.files import check_output, replaced_when_done
 
 __all__ = [
@@ -39,10 +39,10 @@ PARTS_MAX = 100
 
 _Positive = Annotated[float, Field(gt=0.0)]
 #: Strain energies that a model file may name.
-SpringName = Literal[
-    "neo-hookean", "gent", "arruda-boyce", "yeoh", "mooney-rivlin", "ogden", "ogden-two-terms",
-    "extended-tube",
-]  # fmt: skip
+if TYPE_CHECKING:
+    SpringName = str
+else:
+    SpringName = Literal[SPRINGS]
 
 
 @dataclass(frozen=True)
@@ -83,16 +83,10 @@ class _Load(Table):
     rest_length_m: _Positive | None = None
 
 
-class _Spring(Table):
+class _SpringBase(Table):
     spring: SpringName = "gent"
     modulus_Pa: Annotated[float, Field(ge=0.0)]
     limit: _Positive | None = None
-    exponent: float | None = None
-    second_exponent: float | None = None
-    share: float | None = None
-    release: float | None = None
-    quadratic: float | None = None
-    cubic: float | None = None
 
     def build(self) -> Spring:
         law = SPRING_LAWS[self.spring]
@@ -108,7 +102,15 @@ class _Spring(Table):
 
 
 #: Keys of the parameters of all strain energies, beside the limit.
-_SHAPES = [name for name in _Spring.model_fields if name not in ("spring", "modulus_Pa", "limit")]
+_SHAPES = tuple(
+    dict.fromkeys(p.name for law in SPRING_LAWS.values() for p in law.parameters if p.name != LIMIT)
+)
+if TYPE_CHECKING:
+    _Spring = _SpringBase
+else:
+    _Spring = create_model(
+        "_Spring", __base__=_SpringBase, **dict.fromkeys(_SHAPES, (float | None, None))
+    )
 
 
 class _Branch(_Spring):
@@ -125,11 +127,20 @@ _SINCE_THEN: dict[str, dict[str, float | str]] = {
 }
 
 
+#: Effects of earlier versions, and which one holds their amplitudes.
+_REMOVED = {"wandering drift": "fitful drift", "restless drift": "fitful drift"}
+
+
 class _Effect(Table):
     name: str
     values: dict[str, float]
 
     def build(self) -> tuple[str, tuple[tuple[str, float], ...]]:
+        if self.name in _REMOVED:
+            raise ModelError(
+                f"effect {self.name!r} is one of an earlier version: write "
+                f"{_REMOVED[self.name]!r}, with the same amplitudes and 0 for the others"
+            )
         values = dict(self.values)
         for new, then in _SINCE_THEN.get(self.name, {}).items():
             if not isinstance(then, str):

@@ -22,6 +22,7 @@ from dearig.config.segments.base import SEGMENTS_MAX
 from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
 from dearig.drivers.samples import Computed, Samples
 from dearig.errors import InputError
+from dearig.input_file import open_input
 from dearig.model.errors import ModelError
 from dearig.model.simulation.excitation import Segment, Sequence, join
 
@@ -262,7 +263,8 @@ class _Built:
         self.fastest += [table.highest_frequency] * table.repeats
         self.rows += [row] * table.repeats
         for name in table.files:
-            digest = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+            with open_input(folder / name, "waveform") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
             self.attached += f"# {where}: {name} had sha256 {digest}\n"
 
     def join(self) -> None:

@@ -276,7 +276,6 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "seconds": _number(experiment.seconds),
         },
         "experiment_words": outcome.experiment_words,
-        "experiment_summary": outcome.experiment_words,
         "rounds": [
             {
                 "base": list(r.base),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
@@ -14,6 +13,7 @@ import numpy as np
 from dearig.analysis.outcomes import Comparison
 from dearig.analysis.study import Residual, Study, Task, Trace, study
 from dearig.errors import InputError
+from dearig.input_file import parse_json, read_input
 from dearig.model.readings.measures import Errors
 from dearig.model.residual import Dependence, MissingStress
 from dearig.progress import Progress, quiet
@@ -117,11 +117,7 @@ def studies_in(folder: Path) -> tuple[StudyEntry, ...]:
 def _read_words(folder: Path) -> dict[str, Any]:
     path = folder / _WORDS
     try:
-        if path.stat().st_size > _WORDS_MAX:
-            raise InputError(f"{path} has more than {_WORDS_MAX} bytes: it is not a study's")
-        words = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+        words = parse_json(read_input(path, "study", _WORDS_MAX))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is not JSON ({error}); do the study again") from error
     if not isinstance(words, dict) or words.get("format") != FORMAT:

@@ -61,8 +61,6 @@ class Command:
 COMMANDS = {
     "program": Command("PR", (_NUMBER,)),
     "measured value": Command("MS,{out:02d}", (_VALUE,)),
-    "auto-zero on": Command("VS,{out:02d}"),
-    "auto-zero off": Command("WS,{out:02d}"),
     "setting mode": Command("Q0", timeout=_MODE_CHANGE),
     "measuring mode": Command("R0", timeout=_MODE_CHANGE),
     # the following commands work in the setting mode only

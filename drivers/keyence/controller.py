@@ -142,10 +142,6 @@ class Keyence:
             return _STATES[text]
         return float(text) * self._known_unit()
 
-    def auto_zero(self, on: bool) -> None:
-        """Set the zero of values to the present one (``on``), or back to the reference."""
-        self._ask("auto-zero on" if on else "auto-zero off")
-
     def controller_settings(self) -> ControllerSettings:
         """Return the controller's settings; the controller does not measure meanwhile."""
         program = self.program()

@@ -323,8 +323,6 @@ def _notes(
             "the readings at rest have heavier tails than a normal distribution; the fits weigh "
             "readings by their likelihood under Student's t"
         )
-    if end.found.status == "budget":
-        said.append("the search stopped at its computing budget; --thorough searches further")
     if end.found.status == "stopped" and not (end.found.races or end.found.best.members):
         said.append("interrupted before the first round ended: it is not known what is missing")
     kept = {name for name, _ in others.effects}

@@ -12,15 +12,11 @@ effects of the sensor.
 
 from __future__ import annotations
 
-import os
-import sys
-import tempfile
 from collections.abc import Callable, Iterable
-from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import Any
 
-from dearig.model.compiled.jit import cache_folder
+from dearig.model.compiled.generated import generated_module
 from dearig.model.effects.hooks import FASTEST, HOOKS
 from dearig.model.effects.registry import EFFECTS, PLACES
 
@@ -165,46 +161,13 @@ def _text() -> str:
     return "\n".join([*lines, ""])
 
 
-def _written(text: str) -> Path | None:
-    """Return the file with ``text`` in the cache folder; None where it cannot be written."""
-    folder = cache_folder()
-    if folder is None:
-        return None
-    path = folder / "hooks.py"
-    # Written once and atomically: numba compares its modification time with the compiled kernels'.
-    try:
-        if not path.exists() or path.read_text(encoding="utf-8") != text:
-            handle, partial = tempfile.mkstemp(dir=folder, suffix=".py")
-            try:
-                with os.fdopen(handle, "w", encoding="utf-8") as file:
-                    file.write(text)
-                Path(partial).replace(path)
-            finally:
-                Path(partial).unlink(missing_ok=True)
-    except (OSError, UnicodeDecodeError):
-        return None
-    return path
-
-
-def _load() -> ModuleType:
-    name, text = "dearig.model.effects.assembled", _text()
-    path = _written(text)
-    # without a file the functions are compiled in each process
-    module = ModuleType(name)
-    module.__file__ = str(path) if path else None
-    sys.modules[name] = module
-    code = compile(text, str(path) if path else "<assembled hooks>", "exec")
-    exec(code, module.__dict__)  # noqa: S102  (the text is made above, from names that are checked)
-    return module
-
-
 _OF_EFFECT = _bits()
 #: Bits of the effects that have each hook.
 HOOK_BITS = MappingProxyType({h: _mask(n for n in EFFECTS if _has(n, h)) for h in HOOKS})
 #: Bits of the hysteretic effects.
 HYSTERETIC = _mask(n for n, effect in EFFECTS.items() if effect.is_hysteretic)
 
-_hooks: Any = _load()
+_hooks: Any = generated_module("dearig.model.effects.assembled_hooks", _text())
 _Hook = Callable[..., Any]
 
 at_rest: _Hook = _hooks.at_rest

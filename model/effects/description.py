@@ -142,9 +142,6 @@ class Effect:
     is_viscoelastic
         The effect relaxes as the network's branches do; its first two parameters are a modulus and
         a relaxation time. While it is missing from a model, branches can imitate it.
-    generalises
-        Name of an effect that this one contains as a special case. A diagnosis tries this one only
-        where that one explains most and leaves more than noise.
     is_general
         The effect is the general law of its family: linear in its amplitudes, non-negative weights
         on a fixed grid of shapes, with a ``curve``.
@@ -174,7 +171,6 @@ class Effect:
     is_hysteretic: bool = False
     is_reproducible: bool = True
     is_viscoelastic: bool = False
-    generalises: str = ""
     is_general: bool = False
     fitted_shapes: tuple[str, ...] = ()
     curve: Callable[[Mapping[str, float]], Curve] | None = None

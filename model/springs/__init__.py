@@ -5,6 +5,7 @@ A law is W = modulus (U(I1 - 3) + sum w(lam_i)), of the spring's own principal s
 
 from __future__ import annotations
 
+from dearig.model.spring_names import SPRINGS
 from dearig.model.springs.description import LIMIT, ShapeParameter, SpringLaw
 from dearig.model.springs.dispatch import (
     Shape,
@@ -17,10 +18,9 @@ from dearig.model.springs.dispatch import (
     principal_pull_slope,
     slope,
 )
-from dearig.model.springs.registry import FIRST_PRINCIPAL, MODULES, SPRING_LAWS, SPRINGS
+from dearig.model.springs.registry import MODULES, SPRING_LAWS
 
 __all__ = [
-    "FIRST_PRINCIPAL",
     "LIMIT",
     "MODULES",
     "SPRINGS",

@@ -17,6 +17,7 @@ from dearig.model.springs.description import LIMIT, ShapeParameter, SpringLaw
 
 SPRING = SpringLaw(
     name="arruda-boyce",
+    title="Arruda-Boyce",
     summary="Stress of eight chains of finitely many links, which lock when they are straight.",
     source="E. M. Arruda and M. C. Boyce, J. Mech. Phys. Solids 41, 389 (1993)",
     parameters=(

@@ -80,6 +80,8 @@ class SpringLaw:
     starts
         Function of the greatest squared stretch of the records: parameter values, in their order,
         from which the global search starts.
+    title
+        Name as papers write it, where that is not ``name`` with blanks.
     """
 
     name: str
@@ -87,6 +89,12 @@ class SpringLaw:
     source: str
     parameters: tuple[ShapeParameter, ...]
     starts: Callable[[float], tuple[tuple[float, ...], ...]]
+    title: str = ""
+
+    @property
+    def shown(self) -> str:
+        """Name as papers write it."""
+        return self.title or self.name.replace("-", " ")
 
     @property
     def has_limit(self) -> bool:

@@ -3,22 +3,19 @@
 A code is a position in ``registry.MODULES``. ``shape`` is (limit, a, b, c): the law's parameters,
 ``limit`` at 0 and the others in their order, whatever a law does not have at any value. All results
 are per unit modulus, which is the initial shear modulus in Pa (for Arruda-Boyce nearly so).
+
+The source is written from the modules of the laws: each function calls the one of the same name in
+the module of the law, and returns a fixed value for a law without it.
 """
 
 from __future__ import annotations
 
-from dearig.model.compiled.jit import jit
-from dearig.model.springs import (
-    arruda_boyce,
-    extended_tube,
-    gent,
-    mooney_rivlin,
-    neo_hookean,
-    ogden,
-    ogden_two_terms,
-    yeoh,
-)
-from dearig.model.springs.registry import FIRST_PRINCIPAL
+from collections.abc import Callable
+from types import MappingProxyType
+from typing import Any
+
+from dearig.model.compiled.generated import generated_module
+from dearig.model.springs.registry import MODULES
 
 __all__ = [
     "Shape",
@@ -34,112 +31,55 @@ __all__ = [
 
 Shape = tuple[float, float, float, float]
 
-
-@jit
-def energy(kind: int, strain: float, shape: Shape) -> float:
-    """Return U at ``strain`` = I1 - 3."""
-    if kind == 1:
-        return gent.energy(strain, shape)
-    if kind == 0:
-        return neo_hookean.energy(strain, shape)
-    if kind == 2:
-        return arruda_boyce.energy(strain, shape)
-    if kind == 3:
-        return yeoh.energy(strain, shape)
-    if kind == 4:
-        return mooney_rivlin.energy(strain, shape)
-    if kind == 7:
-        return extended_tube.energy(strain, shape)
-    return 0.0
+#: Arguments of each function of a law, and its value for a law without it.
+_FUNCTIONS = MappingProxyType(
+    {
+        "energy": ("strain, shape", "0.0"),
+        "slope": ("strain, shape", "0.0"),
+        "curvature": ("strain, shape", "0.0"),
+        "principal_energy": ("stretch, shape", "0.0"),
+        "principal_pull": ("stretch, shape", "0.0"),
+        "principal_pull_slope": ("stretch, shape", "0.0"),
+        "locking_strain": ("shape", 'float("inf")'),
+    }
+)
 
 
-@jit
-def slope(kind: int, strain: float, shape: Shape) -> float:
-    """Return dU/dI1."""
-    if kind == 1:
-        return gent.slope(strain, shape)
-    if kind == 0:
-        return neo_hookean.slope(strain, shape)
-    if kind == 2:
-        return arruda_boyce.slope(strain, shape)
-    if kind == 3:
-        return yeoh.slope(strain, shape)
-    if kind == 4:
-        return mooney_rivlin.slope(strain, shape)
-    if kind == 7:
-        return extended_tube.slope(strain, shape)
-    return 0.0
+def _text() -> str:
+    """Return the source of the functions."""
+    lines = ["from dearig.model.compiled.jit import jit"]
+    lines += [f"import {module.__name__} as law_{code}" for code, module in enumerate(MODULES)]
+    for name, (arguments, without) in _FUNCTIONS.items():
+        lines += ["", "", "@jit", f"def {name}(kind, {arguments}):"]
+        for code, module in enumerate(MODULES):
+            if hasattr(module, name):
+                lines += [
+                    f"    if kind == {code}:",
+                    f"        return law_{code}.{name}({arguments})",
+                ]
+        lines.append(f"    return {without}")
+    principal = [code for code, module in enumerate(MODULES) if hasattr(module, "principal_energy")]
+    tests = " or ".join(f"kind == {code}" for code in principal)
+    lines += ["", "", "@jit", "def has_principal(kind):", f"    return {tests}"]
+    return "\n".join([*lines, ""])
 
 
-@jit
-def curvature(kind: int, strain: float, shape: Shape) -> float:
-    """Return d2U/dI1^2."""
-    if kind == 1:
-        return gent.curvature(strain, shape)
-    if kind == 2:
-        return arruda_boyce.curvature(strain, shape)
-    if kind == 3:
-        return yeoh.curvature(strain, shape)
-    if kind == 7:
-        return extended_tube.curvature(strain, shape)
-    return 0.0
+_laws: Any = generated_module("dearig.model.springs.assembled_laws", _text())
+_Function = Callable[..., float]
 
-
-@jit
-def has_principal(kind: int) -> bool:
-    """Whether the law has terms in the principal stretches."""
-    return kind >= FIRST_PRINCIPAL
-
-
-@jit
-def principal_energy(kind: int, stretch: float, shape: Shape) -> float:
-    """Return w at a principal ``stretch``; 0 at 1."""
-    if kind == 5:
-        return ogden.principal_energy(stretch, shape)
-    if kind == 6:
-        return ogden_two_terms.principal_energy(stretch, shape)
-    if kind == 4:
-        return mooney_rivlin.principal_energy(stretch, shape)
-    if kind == 7:
-        return extended_tube.principal_energy(stretch, shape)
-    return 0.0
-
-
-@jit
-def principal_pull(kind: int, stretch: float, shape: Shape) -> float:
-    """Return lam dw/dlam at a principal ``stretch``, but for a constant that cancels."""
-    if kind == 5:
-        return ogden.principal_pull(stretch, shape)
-    if kind == 6:
-        return ogden_two_terms.principal_pull(stretch, shape)
-    if kind == 4:
-        return mooney_rivlin.principal_pull(stretch, shape)
-    if kind == 7:
-        return extended_tube.principal_pull(stretch, shape)
-    return 0.0
-
-
-@jit
-def principal_pull_slope(kind: int, stretch: float, shape: Shape) -> float:
-    """Return the derivative of ``principal_pull`` by the stretch."""
-    if kind == 5:
-        return ogden.principal_pull_slope(stretch, shape)
-    if kind == 6:
-        return ogden_two_terms.principal_pull_slope(stretch, shape)
-    if kind == 4:
-        return mooney_rivlin.principal_pull_slope(stretch, shape)
-    if kind == 7:
-        return extended_tube.principal_pull_slope(stretch, shape)
-    return 0.0
-
-
-@jit
-def locking_strain(kind: int, shape: Shape) -> float:
-    """Return I1 - 3 at the locking stretch, beyond which the spring has no energy."""
-    if kind == 1:
-        return gent.locking_strain(shape)
-    if kind == 2:
-        return arruda_boyce.locking_strain(shape)
-    if kind == 7:
-        return extended_tube.locking_strain(shape)
-    return float("inf")
+#: U at ``strain`` = I1 - 3.
+energy: _Function = _laws.energy
+#: dU/dI1.
+slope: _Function = _laws.slope
+#: d2U/dI1^2.
+curvature: _Function = _laws.curvature
+#: w at a principal ``stretch``; 0 at 1.
+principal_energy: _Function = _laws.principal_energy
+#: lam dw/dlam at a principal ``stretch``, but for a constant that cancels.
+principal_pull: _Function = _laws.principal_pull
+#: Derivative of ``principal_pull`` by the stretch.
+principal_pull_slope: _Function = _laws.principal_pull_slope
+#: I1 - 3 at the locking stretch, beyond which the spring has no energy.
+locking_strain: _Function = _laws.locking_strain
+#: Whether the law has terms in the principal stretches.
+has_principal: Callable[[int], bool] = _laws.has_principal

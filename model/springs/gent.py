@@ -9,6 +9,7 @@ from dearig.model.springs.description import LIMIT, ShapeParameter, SpringLaw
 
 SPRING = SpringLaw(
     name="gent",
+    title="Gent",
     summary="Stiffens towards a greatest strain, and is neo-Hookean far below it.",
     source="A. N. Gent, Rubber Chem. Technol. 69, 59 (1996)",
     parameters=(

@@ -11,6 +11,7 @@ from dearig.model.springs.ogden import power_energy, power_pull, power_pull_slop
 
 SPRING = SpringLaw(
     name="mooney-rivlin",
+    title="Mooney-Rivlin",
     summary="Linear in both invariants: softens at moderate stretches.",
     source="M. Mooney, J. Appl. Phys. 11, 582 (1940)",
     parameters=(

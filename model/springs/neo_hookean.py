@@ -7,6 +7,7 @@ from dearig.model.springs.description import SpringLaw
 
 SPRING = SpringLaw(
     name="neo-hookean",
+    title="neo-Hookean",
     summary="Stress of Gaussian chains, which never lock.",
     source="R. S. Rivlin, Phil. Trans. R. Soc. A 240, 459 (1948)",
     parameters=(),

@@ -14,6 +14,7 @@ from dearig.model.springs.description import ShapeParameter, SpringLaw
 
 SPRING = SpringLaw(
     name="ogden",
+    title="Ogden",
     summary="One power of the principal stretches.",
     source="R. W. Ogden, Proc. R. Soc. A 326, 565 (1972)",
     parameters=(

@@ -11,6 +11,7 @@ from dearig.model.springs.ogden import power_energy, power_pull, power_pull_slop
 
 SPRING = SpringLaw(
     name="ogden-two-terms",
+    title="Ogden (two terms)",
     summary="Two powers of the principal stretches.",
     source="R. W. Ogden, Proc. R. Soc. A 326, 565 (1972)",
     parameters=(

@@ -16,6 +16,7 @@ def _starts(square: float) -> tuple[tuple[float, ...], ...]:
 
 SPRING = SpringLaw(
     name="yeoh",
+    title="Yeoh",
     summary="A cubic of I1 - 3: softens at first and stiffens later.",
     source="O. H. Yeoh, Rubber Chem. Technol. 66, 754 (1993)",
     parameters=(

@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from dearig.config.modelfile import _File, load_model, save_model
+from dearig.config.modelfile import _File, load_model, model_toml, save_model
 from dearig.errors import InputError
 from dearig.model.film.material import (
     TABLE_3,
@@ -181,3 +181,12 @@ def test_a_spring_has_the_numbers_of_its_law(tmp_path: Path, spring: str, words:
 def test_a_file_takes_every_law() -> None:
     taken = _File.model_fields["equilibrium"].annotation.model_fields["spring"].annotation
     assert get_args(taken) == SPRINGS
+
+
+@pytest.mark.parametrize("name", ["wandering drift", "restless drift"])
+def test_a_drift_of_an_earlier_version_says_what_to_write(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "m.toml"
+    text = model_toml("m", Strip(TABLE_3, "uniaxial"), {})
+    path.write_text(f'{text}\n[[effect]]\nname = "{name}"\nvalues = {{linear = 1e-6}}\n', "utf-8")
+    with pytest.raises(InputError, match="write 'fitful drift', with the same amplitudes and 0"):
+        load_model(path)

@@ -105,7 +105,9 @@ def _names(option: Any, kinds: dict[str, Any]) -> str:
 
 
 def _kind(annotation: Any) -> str:
-    """What a value may be: the choices of an enumeration, or the kind of number or text."""
+    """What a value may be: its choices, or the kind of number or text."""
+    if typing.get_origin(annotation) is typing.Literal:
+        return "|".join(typing.get_args(annotation))
     for part in typing.get_args(annotation):
         if part is not type(None):
             return _kind(part)

@@ -1,6 +1,10 @@
 """Strain energies, kinematics and network stress against definitions, series and closed forms."""
 
+import json
 import math
+import os
+import subprocess
+import sys
 from decimal import Decimal, getcontext
 
 import numpy as np
@@ -338,3 +342,16 @@ def test_stiffness_of_a_spring(held, spring):
 def test_beyond_locking_a_spring_is_infinitely_stiff(held):
     assert nominal_pull(held, GENT, (0.5, 0.0, 0.0, 0.0), 0.5, 3.0) == math.inf
     assert nominal_pull_slope(held, GENT, (0.5, 0.0, 0.0, 0.0), 0.5, 3.0) == math.inf
+
+
+def test_a_law_is_added_by_its_file_and_one_line(tmp_path):
+    ran = subprocess.run(
+        [sys.executable, "-m", "tests.model.one_more_spring", str(tmp_path)],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stderr
+    assert json.loads(ran.stdout) == {
+        "options": True, "read": True, "shown": "Cubic", "kernel": [1.5, 1.0, 0.25, 0.0],
+        "locking": True, "principal": False,
+    }  # fmt: skip

@@ -6,7 +6,9 @@ import io
 import json
 import logging
 import re
+import signal
 import sys
+import threading
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +17,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from dearig.acquisition import interrupts
 from dearig.cli.main import main
 from dearig.config.modelfile import save_model
 from dearig.config.presets import PRESETS
@@ -65,11 +68,18 @@ def dearig(*arguments: str | Path) -> Answer:
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", newline="\n") for _ in range(2))
     argv = ["dearig", *(str(a) for a in arguments)]
     unexpected = _Unexpected()
-    with patch.object(sys, "argv", argv), redirect_stdout(out), redirect_stderr(err), unexpected:
+    asked = signal.getsignal(signal.SIGINT)
+    with (
+        patch.object(sys, "argv", argv), redirect_stdout(out), redirect_stderr(err), unexpected,
+        patch.object(interrupts, "_ends_program", False),
+    ):  # fmt: skip
         try:
             main()
         except SystemExit as end:
             code = end.code
+        finally:
+            if threading.current_thread() is threading.main_thread():
+                signal.signal(signal.SIGINT, asked)
     if unexpected.error is not None:
         raise unexpected.error
     texts = []

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dearig.input_file import open_input
 from dearig.recording.files import journal_of, replaced_when_done
 from dearig.recording.lock import FileLock, ReplacedError
 
@@ -36,8 +37,6 @@ MAGIC = b"dearig-journal/1"
 PAGE = 4096
 HEAD = struct.Struct("<16sQQQ")  # magic, size before, size after, pages
 PIECE = struct.Struct("<QI")  # offset, length; then the old bytes, then the new ones
-#: Bytes of a journal, at most: finishing a recording never needs more.
-LARGEST = 2**28
 
 
 class Patched(io.RawIOBase):
@@ -224,35 +223,40 @@ def _apply(file: io.FileIO, end: int, pages: dict[int, bytes]) -> None:
 def whole_journal(path: Path) -> tuple[int, int, dict[int, bytes]] | None:
     """Return size before, size after and new pages from the journal of ``path``; None without one.
 
-    None too for a journal that is cut short or belongs to another file: every byte in the file must
-    be the old or the new one. Raises ``OSError``.
+    None too for a journal that is cut short, that contradicts itself, or that belongs to another
+    file: every byte in the file must be the old or the new one. Memory is bounded by the pages of
+    the file. Raises ``InputError`` for one that is not a file, such as a pipe, and ``OSError``.
     """
-    try:
-        with journal_of(path).open("rb") as stream:
-            raw = stream.read(LARGEST + 1)
-    except FileNotFoundError:
+    beside = journal_of(path)
+    if not os.path.lexists(beside):
         return None
-    if not HEAD.size + 4 <= len(raw) <= LARGEST or raw[: len(MAGIC)] != MAGIC:
-        return None
-    content = raw[:-4]
-    if struct.unpack("<I", raw[-4:])[0] != zlib.crc32(content):
-        return None
-    _, before, after, count = HEAD.unpack_from(content)
-    pages: dict[int, bytes] = {}
-    at = HEAD.size
-    with path.open("rb") as file:
-        if file.seek(0, 2) < min(before, after):
+    with open_input(beside, "journal") as stream, path.open("rb") as file:
+        about = file.seek(0, 2)
+        head = stream.read(HEAD.size)
+        if len(head) < HEAD.size or head[: len(MAGIC)] != MAGIC:
             return None
+        _, before, after, count = HEAD.unpack(head)
+        # what was appended is in the file before the journal is written
+        if about < after or count > -(-before // PAGE):
+            return None
+        crc, pages = zlib.crc32(head), dict[int, bytes]()
         for _ in range(count):
-            offset, size = PIECE.unpack_from(content, at)
-            at += PIECE.size
-            old, new = content[at : at + size], content[at + size : at + 2 * size]
-            at += 2 * size
-            file.seek(offset)
-            here = file.read(size).ljust(size, b"\0")
-            if not _either(here, old, new):
+            piece = stream.read(PIECE.size)
+            if len(piece) < PIECE.size:
                 return None
+            offset, length = PIECE.unpack(piece)
+            if offset % PAGE or length != min(PAGE, before - offset):
+                return None
+            both = stream.read(2 * length)
+            old, new = both[:length], both[length:]
+            file.seek(offset)
+            here = file.read(length).ljust(length, b"\0")
+            if len(new) < length or not _either(here, old, new):
+                return None
+            crc = zlib.crc32(both, zlib.crc32(piece, crc))
             pages[offset // PAGE] = new
+        if stream.read(5) != struct.pack("<I", crc):
+            return None
     return before, after, pages
 
 

@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 
 from dearig.errors import InputError
+from dearig.input_file import parse_json, read_input
 from dearig.model.compiled.trusted_folder import cache_root
 from dearig.recording.content.fields import CONDITIONS, TEXTS, read_texts
 from dearig.recording.content.layout import FORMAT, SIGNALS, counts_name
@@ -58,6 +59,7 @@ PEAKS = (
 OUTLINE = 40
 #: Events of a recording in the index, at most.
 EVENTS_MAX = 12
+_CACHE_MAX = 2**28  # bytes: ten times the entries of 10,000 recordings
 #: Version of the cache, with the fields that it holds; another one is not read.
 KEPT = f"dearig-index/5 {' '.join((*TEXTS, *CONDITIONS))}"
 
@@ -353,14 +355,14 @@ def _load(cache: Path | None) -> dict[str, tuple[tuple[int, int], Entry]]:
     if cache is None:
         return {}
     try:
-        kept = json.loads(cache.read_text("utf-8"))
+        kept = parse_json(read_input(cache, "index", _CACHE_MAX))
         if kept["format"] != KEPT:
             return {}
         return {
             str(name): ((int(size), int(changed)), _entry_from(facts))
             for name, size, changed, facts in kept["files"]
         }
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+    except (InputError, ValueError, TypeError, KeyError, RecursionError):
         return {}
 
 

@@ -6,13 +6,12 @@ tags stay with a recording that is renamed, and do not go over to another one of
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from dearig.errors import InputError
-from dearig.input_file import read_input
+from dearig.input_file import parse_json, read_input
 from dearig.printable import printable
 from dearig.recording.json_file import write_json
 
@@ -62,7 +61,7 @@ def read_tags(folder: Path) -> tuple[Tagged, ...]:
         return ()
     content = read_input(path, "file of tags", BYTES_MAX)
     try:
-        told = json.loads(content)
+        told = parse_json(content)
         if told["format"] != FORMAT:
             raise InputError(f"{path} is not of format {FORMAT}")
         return tuple(

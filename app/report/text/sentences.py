@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise, pooled_rms
 from dearig.model.readings.noise import LEAD_IN
+from dearig.model.springs import SPRING_LAWS
 from dearig.model.verdict import is_rejected, smallest_p
 from dearig.report.text.numbers import seconds, significant, symbol
-from dearig.report.text.spring_names import spring_name
 from dearig.report.text.thesis import SIMULATED_CAVEAT
 from dearig.units import SHOWN
 
@@ -66,7 +66,7 @@ def describe_model(model: Actuator | Strip) -> str:
     """Return springs, branches and effects of a model in a few words."""
     network = model.network
     kinds = sorted({s.kind for s in network.springs})
-    springs = listed(map(spring_name, kinds))
+    springs = listed(SPRING_LAWS[kind].shown for kind in kinds)
     words = f"{springs} springs with {_counted(len(network.branches), 'relaxation branch')}"
     words = words.replace("branchs", "branches")
     effects = [name for name, _ in model.effects]
@@ -121,12 +121,12 @@ def _spring_texts(candidates: Sequence[SpringCandidate]) -> list[str]:
         odds[candidate.spring] = odds.get(candidate.spring, 0.0) + candidate.probability
     chosen = next(c.spring for c in candidates if c.chosen)
     rest = listed(
-        f"{spring_name(kind)} ({p:.2f})"
+        f"{SPRING_LAWS[kind].shown} ({p:.2f})"
         for kind, p in sorted(odds.items(), key=lambda item: -item[1])
         if kind != chosen and p >= _LIKELY
     )
     return [
-        f"Of {len(odds)} strain energies the training data give {spring_name(chosen)} the "
+        f"Of {len(odds)} strain energies the training data give {SPRING_LAWS[chosen].shown} the "
         f"probability {odds[chosen]:.2f}" + (f"; not excluded: {rest}." if rest else ".")
     ]
 

@@ -135,14 +135,6 @@ def test_the_unit_is_asked_for_once() -> None:
     ]  # fmt: skip
 
 
-def test_auto_zero_counts_from_the_present_value_and_back() -> None:
-    laser, _, _ = connected()
-    laser.auto_zero(True)
-    assert laser.read() == 0.0
-    laser.auto_zero(False)
-    assert laser.read() == pytest.approx(6.4e-3)
-
-
 # ---------------------------------------------------------------- settings
 
 
@@ -333,23 +325,23 @@ def test_silence_after_a_change_of_mode_is_waited_for_once() -> None:
 
 @pytest.mark.parametrize("code", sorted(ERRORS))
 def test_error_replies_are_sentences(code: int) -> None:
-    port = Replying(f"ER,VS,{code:02d}\r".encode())
-    with pytest.raises(LaserError, match=f"VS,01 with code {code:02d}: {ERRORS[code][0]}"):
-        Keyence(port, SETTINGS, port.now).auto_zero(True)
+    port = Replying(f"ER,MS,{code:02d}\r".encode())
+    with pytest.raises(LaserError, match=f"MS,01 with code {code:02d}: {ERRORS[code][0]}"):
+        Keyence(port, SETTINGS, port.now)._ask("measured value")
 
 
 def test_an_unknown_code_is_named() -> None:
-    port = Replying(b"ER,VS,77\r")
+    port = Replying(b"ER,PR,77\r")
     with pytest.raises(LaserError, match="code 77: an unknown error"):
-        Keyence(port, SETTINGS, port.now).auto_zero(True)
+        Keyence(port, SETTINGS, port.now).program()
 
 
 def test_a_late_reply_is_not_taken_for_the_next_one() -> None:
-    port = Replying(b"PR,7\rWS\r", b"VS\r")
+    port = Replying(b"PR,7\rMS,01,+1\r", b"PR,8\r")
     laser = Keyence(port, SETTINGS, port.now)
     assert laser.program() == 7
-    laser.auto_zero(True)
-    assert port.written == [b"PR\r", b"VS,01\r"]
+    assert laser.program() == 8
+    assert port.written == [b"PR\r", b"PR\r"]
 
 
 def test_garbage_is_got_over() -> None:
@@ -401,14 +393,13 @@ PIECES = st.one_of(
 )  # fmt: skip
 
 
-@given(st.lists(PIECES, max_size=60), st.sampled_from(["read", "settings", "zero", "program"]))
+@given(st.lists(PIECES, max_size=60), st.sampled_from(["read", "settings", "program"]))
 def test_any_bytes_give_a_number_a_state_or_an_error(chunks: list[bytes], call: str) -> None:
     port = Scripted([c for c in chunks if c])
     laser = Keyence(port, SETTINGS, port.now)
     calls: dict[str, Callable[[], object]] = {
         "read": laser.read,
         "settings": laser.controller_settings,
-        "zero": lambda: laser.auto_zero(True),
         "program": laser.program,
     }
     try:

@@ -134,7 +134,6 @@ def test_a_search_without_work_left_ends_with_what_it_has() -> None:
     settings = DiagnosisSettings(effort=2e6)
     found = diagnose([record_of(plant("sensor curvature"))], PLAIN, workers=1, settings=settings)
     assert found.status == "budget"
-    assert any("computing budget" in note for note in found.notes)
 
 
 @pytest.mark.deep

@@ -344,8 +344,6 @@ SHOWN = {
         / (np.power(1.0 + 30.0 / p["onset"], p["exponent"]) - 1.0)
     ),
     "sensor double lag": shown_by_two_lags,
-    "wandering drift": shown_by_walk,
-    "restless drift": shown_by_walk,
     "fitful drift": shown_by_walk,
     "sudden change of reading": lambda p, t: (
         moved(t)[0] + p["jump"] * np.clip((t - p["moment"]) / 0.02 + 0.5, 0.0, 1.0)

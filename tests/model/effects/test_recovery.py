@@ -43,8 +43,6 @@ LARGER = {
     "linear drift": 3.0,
     "settling drift": 3.0,
     "slowing drift": 30.0,
-    "wandering drift": 3.0,
-    "restless drift": 3.0,
     "fitful drift": 3.0,
     "mains interference": 2.0,
     "vibration": 2.0,

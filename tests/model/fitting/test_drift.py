@@ -15,18 +15,20 @@ from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Drive
-from tests.tools.engine import NOISE, PLAIN, effect, masked, record_of, typical
+from tests.tools.engine import NOISE, PLAIN, effect, masked, record_of, thesis_drive, typical
 
 DRIFTS = [name for name, e in EFFECTS.items() if e.drift_basis is not None]
-WITH_DRIFT = replace(PLAIN, effects=(typical("wandering drift"),))
-AMPLITUDES = ("linear", "quadratic", "cubic", "quartic", "quintic")
-DRIFT_AMPLITUDES = np.array([[2e-5, -8e-6, 3e-6, 1e-6, -2e-6], [-1e-5, 6e-6, -5e-6, 2e-6, 1e-6]])
+WITH_DRIFT = replace(PLAIN, effects=(typical("fitful drift"),))
+AMPLITUDES = tuple(p.name for p in EFFECTS["fitful drift"].parameters)
+DRIFT_AMPLITUDES = np.zeros((2, len(AMPLITUDES)))
+DRIFT_AMPLITUDES[:, :5] = [[2e-5, -8e-6, 3e-6, 1e-6, -2e-6], [-1e-5, 6e-6, -5e-6, 2e-6, 1e-6]]
 
 
 def drifting(seed: int, sizes: np.ndarray) -> ActuatorRecord:
     """A record whose reading drifts; with ``seed`` in its name."""
-    drift = effect("wandering drift", **dict(zip(AMPLITUDES, sizes, strict=True)))
-    record = record_of(replace(PLAIN, effects=drift), seed=seed)
+    drift = effect("fitful drift", **dict(zip(AMPLITUDES, sizes, strict=True)))
+    # 34 s: a shorter record does not determine thirteen amplitudes over 30 s
+    record = record_of(replace(PLAIN, effects=drift), thesis_drive(periods=3), seed)
     return replace(record, name=f"run {seed}", lead_in=150)
 
 
@@ -75,8 +77,8 @@ def test_shared_parameters_and_drift_equal_those_of_one_joint_fit():
     found = problem.fit_drift(fit.x)
     shared = ~held & ~problem.own
     plain = Problem(TWO, Layout(PLAIN), workers=1)
-    k = int(shared.sum())
-    scale = np.concatenate([np.maximum(np.abs(start[shared]), 1.0), np.full(10, 1e-6)])
+    k, own = int(shared.sum()), DRIFT_AMPLITUDES.size
+    scale = np.concatenate([np.maximum(np.abs(start[shared]), 1.0), np.full(own, 1e-6)])
 
     def left(z: np.ndarray) -> np.ndarray:
         x = start[: plain.layout.size].copy()
@@ -84,7 +86,10 @@ def test_shared_parameters_and_drift_equal_those_of_one_joint_fit():
         return plain.residuals(x) + problem.drift.basis @ (z[k:] * scale[k:]) / NOISE
 
     great = least_squares(
-        left, np.concatenate([start[shared], np.zeros(10)]) / scale, x_scale="jac", xtol=1e-12
+        left,
+        np.concatenate([start[shared], np.zeros(own)]) / scale,
+        x_scale="jac",
+        xtol=1e-12,
     )
     np.testing.assert_allclose(2.0 * great.cost / problem.samples, fit.cost, rtol=1e-6)
     np.testing.assert_allclose(great.x[:k] * scale[:k], fit.x[shared], rtol=2e-4)
@@ -98,7 +103,7 @@ def test_shared_parameters_and_drift_equal_those_of_one_joint_fit():
 def test_numbers_that_each_record_has_for_itself_do_nothing():
     problem, x, _ = problem_of(TWO)
     assert list(np.array(problem.layout.names)[problem.own]) == [
-        f"wandering drift: {size}" for size in AMPLITUDES
+        f"fitful drift: {size}" for size in AMPLITUDES
     ]
     other = x.copy()
     other[problem.own] = 1e-4

@@ -468,7 +468,6 @@ class TestJson:
 
     def test_plain_keys_stand_beside_the_older_ones(self):
         found = diagnosis_json(diagnose_outcome())
-        assert found["experiment_summary"] == found["experiment_words"]
         for signature in found["residual_before"].values():
             assert signature["remarks"] == signature["words"]
         for candidate in found["rounds"][0]["candidates"]:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.input_file import open_input
+from dearig.input_file import open_input, parse_json
 from dearig.recording.files import in_words
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
@@ -71,9 +71,9 @@ def _content(path: Path) -> tuple[Json, bool]:
     try:
         text = raw.decode(encoding_of(raw[: 2**16], path))
         try:
-            return json.loads(text), False
+            return parse_json(text), False
         except json.JSONDecodeError:
-            rows = [json.loads(line) for line in text.splitlines() if line.strip()]
+            rows = [parse_json(line) for line in text.splitlines() if line.strip()]
             if len(rows) < 2:
                 raise
             return rows, True
