@@ -38,6 +38,7 @@ from dearig.config.campaignfile import Campaign, PlannedRun, digest_of, settings
 from dearig.config.modelfile import load_actuator
 from dearig.config.notify import Notify
 from dearig.config.rigfile import RigFile
+from dearig.config.safe_ends import is_safe_end
 from dearig.config.sequencefile import LoadedSequence
 from dearig.errors import (
     DearigError,
@@ -496,6 +497,9 @@ class _Session:
         self._output = error.output_state
         # nobody was there: what kept a run from its rig would keep the next one from it too
         looks = error.needs_inspection or error.output_state is None
+        safe = is_safe_end(error, self._campaign.repeat_after)
+        if safe and path.exists() and state.attempts <= self.queue.repeat_lost:
+            looks = False
         if looks:
             self._halt(f"run {state.name}: {error}")
         if not path.exists():
@@ -505,7 +509,7 @@ class _Session:
             self._end(state, how, str(error), tripped=looks)
         if looks:
             return "halted", self.queue.halted, error
-        if isinstance(error, DiskFault):
+        if safe or isinstance(error, DiskFault):
             return None
         status = "interrupted" if isinstance(error, Interrupted) else "refused"
         return status, str(error), error

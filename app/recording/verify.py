@@ -487,6 +487,6 @@ class _Check:
             for name, row in plot.items():
                 if name == "time" or row.shape != plot["time"].shape:
                     continue
-                scales = row.dims[0].values()
-                if [scale.name for scale in scales] != [plot["time"].name]:
+                scales = list(row.dims[0].values())
+                if scales != [plot["time"]]:
                     self.fault(f"the dimension scale of {row.name} is not time")

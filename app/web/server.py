@@ -53,6 +53,7 @@ class WatchServer:
         from dearig.web.access import is_loopback
         from dearig.web.app import watch_app
         from dearig.web.feed import Feed
+        from dearig.web.patience import PatientProtocol
         from dearig.web.state import look
 
         self._socket = _listen(host, port)
@@ -65,7 +66,8 @@ class WatchServer:
             watch_app(feed, host, self.port, token),
             # the log would have the token, and a page that was opened is no news
             log_config=None, access_log=False, log_level="error", server_header=False,
-            ws="none", lifespan="off", limit_concurrency=200, timeout_graceful_shutdown=3,
+            http=PatientProtocol, ws="none", lifespan="off", limit_concurrency=200,
+            timeout_graceful_shutdown=3,
         )  # fmt: skip
         self._server: Server = uvicorn.Server(config)
         name = host

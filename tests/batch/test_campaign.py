@@ -18,12 +18,14 @@ from dearig.batch.journal import JOURNAL, REQUESTS
 from dearig.batch.queue import Queue
 from dearig.batch.watching import seen
 from dearig.config.modelfile import save_model
+from dearig.drivers.errors import RigError
 from dearig.errors import DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator
+from dearig.output_state import OutputState
 from dearig.report.pages.campaign import campaign_table
 from tests.tools.command import LOBE
-from tests.tools.played import PLAN, RIG_FILE, UNKNOWN, Bench, Killed
+from tests.tools.played import CONFIRMED, PLAN, RIG_FILE, UNKNOWN, Bench, Killed
 
 NAMES = ["three-0001", "three-0002", "three-0003"]
 LOOKED = Arming("Ada", acknowledged="0 V at the amplifier")
@@ -108,6 +110,56 @@ def test_a_lost_recording_is_repeated_only_if_the_plan_says_so(bench: Bench) -> 
         "three-0001": 1, "three-0002": 1, "three-0002-attempt-2": 1, "three-0003": 1
     }  # fmt: skip
     assert (bench.out / "three-0002.h5").exists()  # what was recorded until the kill
+
+
+def fault_of_the_card(code: int | None) -> InstrumentFault:
+    error = InstrumentFault("a fault of the card; the rig was made safe")
+    error.__cause__ = RigError("a fault", code)
+    return error
+
+
+BY_GUARDIAN = replace(CONFIRMED, by_guardian=True)
+OVERFLOW, UNDERFLOW = -200279, -200290
+
+
+@pytest.mark.parametrize(
+    ("named", "code", "state", "goes_on"),
+    [
+        ('["input-overflow"]', OVERFLOW, CONFIRMED, True),
+        ('["input-overflow", "output-underflow"]', UNDERFLOW, CONFIRMED, True),
+        ("[]", OVERFLOW, CONFIRMED, False),
+        ('["output-underflow"]', OVERFLOW, CONFIRMED, False),
+        ('["input-overflow"]', OVERFLOW, UNKNOWN, False),
+        ('["input-overflow"]', OVERFLOW, BY_GUARDIAN, False),
+        ('["input-overflow"]', None, CONFIRMED, False),
+    ],
+)
+def test_only_named_ends_at_confirmed_zero_are_repeated(
+    bench: Bench, named: str, code: int | None, state: OutputState, goes_on: bool
+) -> None:
+    bench.fail("three-0002", fault_of_the_card(code), state)
+    plan = PLAN + f"repeat_lost = 1\nrepeat_after = {named}\n"
+    if goes_on:
+        assert bench.play(plan).status == "complete"
+        assert states(bench) == ["done"] * 3
+        assert bench.played["three-0002-attempt-2"] == 1
+        return
+    with pytest.raises(InstrumentFault):
+        bench.play(plan)
+    with pytest.raises(InputError, match="the campaign is halted"):
+        bench.play(plan, resume=True)
+    assert bench.played["three-0002-attempt-2"] == 0
+
+
+def test_an_end_that_comes_again_halts_after_the_allowed_repeats(bench: Bench) -> None:
+    bench.fail("three-0002", fault_of_the_card(OVERFLOW))
+    bench.fail("three-0002-attempt-2", fault_of_the_card(OVERFLOW))
+    plan = PLAN + 'repeat_lost = 1\nrepeat_after = ["input-overflow"]\n'
+    with pytest.raises(InstrumentFault):
+        bench.play(plan)
+    assert bench.played["three-0002-attempt-3"] == 0
+    with pytest.raises(InputError, match="the campaign is halted: run three-0002"):
+        bench.play(plan, resume=True)
 
 
 @pytest.mark.parametrize("error", [SafetyStop("arc"), InstrumentFault("no card")])

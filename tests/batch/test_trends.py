@@ -19,7 +19,6 @@ from tests.tools.command import dearig, done, refused
 from tests.tools.made_campaign import TRUTH, made_rows
 
 pytest.importorskip("statsmodels", reason='takes the extra "trends"')
-pytest.importorskip("ruptures", reason='takes the extra "trends"')
 
 SOURCE = Path("study.csv")
 STORY = {"own": {"F05": 0.03}, "jump": ("F07", 6, -0.12)}

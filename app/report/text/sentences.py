@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise, pooled_rms
 from dearig.model.readings.noise import LEAD_IN
 from dearig.model.springs import SPRING_LAWS
-from dearig.model.verdict import is_rejected, smallest_p
+from dearig.model.verdict import is_rejected, p_text, smallest_p
 from dearig.report.text.numbers import seconds, significant, symbol
 from dearig.report.text.thesis import SIMULATED_CAVEAT
 from dearig.units import SHOWN
@@ -235,15 +235,15 @@ def _error(comparisons: Sequence[Comparison]) -> str:
     ratio = pooled_over_noise(comparisons) or 0.0
     times = f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that"
     p = smallest_p(c.misfit_p for c in comparisons)
-    if is_rejected(p):
+    if p is not None and is_rejected(p):
         return (
             f"{times}. The model is rejected: noise as that at rest leaves such a residual with "
-            f"p = {p:.1g}."
+            f"{p_text(p)}."
         )
     if ratio <= _AT_NOISE:
         return f"{words} The noise floor is {floor}: the residual is almost only noise."
     if p is not None:
-        return f"{times}, which noise as that at rest does not exclude (p = {p:.2g})."
+        return f"{times}, which noise as that at rest does not exclude ({p_text(p)})."
     if ratio > _ABOVE_NOISE:
         return f"{times}, so that it is more than noise, which the model does not describe."
     return f"{times}; there are too few readings at rest to tell whether that is more than noise."
