@@ -35,7 +35,7 @@ from dearig.cli.last_words import (
     silence_libraries,
 )
 from dearig.cli.lost_interrupt import note_lost
-from dearig.cli.output import version
+from dearig.cli.output import version, with_hints
 from dearig.command_line import without_secrets
 from dearig.errors import DearigError, DiskFault, InputError, Interrupted
 from dearig.printable import MESSAGE_MAX, PrintableStream, printable
@@ -208,7 +208,7 @@ def _run(written: log_file.LogFile) -> int:
         sys.stdout.flush()
     except DearigError as error:
         ignore_interrupts()
-        _say(str(error))
+        _say(with_hints(error))
         return error.exit_code
     except TyperException as error:
         _say(_usage(error))

@@ -55,8 +55,6 @@ TEXT_MAX = 2**27
 #: A plan that the rig of the thesis can play.
 EXAMPLE = """\
 # A campaign: many unattended runs, one after the other.
-#   dearig campaign FILE.toml --rig sim --out DIR --check    (says how long it takes; plays nothing)
-#   dearig campaign FILE.toml --rig sim --out DIR
 name = "ageing"
 sequence = "validation-b-6.0"   # a preset, or a sequence file in this folder
 repeat = 2                      # times that each setting is played

@@ -22,7 +22,7 @@ __all__ = ["WatchServer", "serve_watch", "token_from"]
 
 #: Characters of a token that a person made, at least and at most.
 TOKEN_MIN, TOKEN_MAX = 16, 200
-_PURPOSE = "the web page of dearig watch"
+_PURPOSE = "the web page that shows a run"
 
 
 def token_from(path: Path) -> str:
@@ -115,5 +115,6 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         raise InputError(
             f"the page cannot be shown at {host}, port {port}: {in_words(error)}; give another "
-            f"--port, or 0 for a free one"
+            f"port, or 0 for a free one",
+            option="port",
         ) from error

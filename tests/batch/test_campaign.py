@@ -17,6 +17,7 @@ from dearig.batch.forecast import foresee, survey
 from dearig.batch.journal import JOURNAL, REQUESTS
 from dearig.batch.queue import Queue
 from dearig.batch.watching import seen
+from dearig.cli.output import with_hints
 from dearig.config.modelfile import save_model
 from dearig.drivers.errors import RigError
 from dearig.errors import DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
@@ -41,7 +42,7 @@ def test_every_run_is_played_once_in_order(bench: Bench) -> None:
     assert list(bench.played.items()) == [(name, 1) for name in NAMES]
     assert len(set(bench.seeds.values())) == 3
     assert states(bench) == ["done"] * 3
-    with pytest.raises(InputError, match="with 3 of 3 runs done; continue it with --resume"):
+    with pytest.raises(InputError, match="with 3 of 3 runs done; continue it, or"):
         bench.play()
 
 
@@ -170,7 +171,7 @@ def test_an_interlock_and_a_fault_halt_until_a_person_has_looked(bench: Bench, e
     plan = PLAN + "repeat_lost = 3\n"
     with pytest.raises(InputError, match="the campaign is halted: run three-0001"):
         bench.play(plan, resume=True)
-    with pytest.raises(InputError, match="needs --operator"):
+    with pytest.raises(InputError, match="needs the name of who looked"):
         bench.play(plan, Arming(acknowledged="looked"), resume=True)
     assert bench.played.total() == 1
     assert bench.play(plan, LOOKED, resume=True).status == "complete"
@@ -292,7 +293,7 @@ def test_a_survey_says_of_every_run_why_it_is_refused(bench: Bench) -> None:
 def test_a_real_rig_is_armed_by_a_person_for_runs_and_hours(bench: Bench) -> None:
     bench.simulated = False
     for arming in (Arming(), Arming("Ada"), Arming("Ada", runs=2), Arming(runs=2, hours=1.0)):
-        with pytest.raises(InputError, match="--operator NAME, --runs N and --hours H"):
+        with pytest.raises(InputError, match="say who arms it, for how many runs"):
             bench.continued(arming=arming)
     assert bench.play(arming=Arming("Ada", 2, 1.0)).status == "armed_runs"
     assert states(bench) == ["done", "done", "waiting"]
@@ -482,8 +483,11 @@ def test_the_gate_checks_a_run_with_the_film_s_present_model(
     )
     computed(monkeypatch, model="../soft.toml")
     plan = PLAN + "[after]\nidentify = true\n"
-    with pytest.raises(InputError, match=r"with the film's present model .*--skip three-0002"):
+    with pytest.raises(
+        InputError, match=r"with the film's present model .* three-0002 out"
+    ) as told:
         bench.play(plan)
+    assert with_hints(told.value).endswith(f" (dearig campaign-queue {bench.out} --skip)")
     assert bench.played.total() == 1
     assert states(bench) == ["done", "waiting", "waiting"]
 

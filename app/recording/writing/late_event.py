@@ -41,7 +41,7 @@ def add_event(path: str | Path, level: str, message: str) -> None:
     recording = open_recording(path)
     try:
         if not is_finished(path):
-            raise InputError(f"{path} is not finished; finish it with dearig recover {path}")
+            raise InputError(f"{path} is not finished; recover it", command=("recover", str(path)))
         row = np.zeros(1, dtype=EVENT_TYPE)
         last, text = max(recording.samples - 1, 0), clip_text(message, MESSAGE_BYTES)
         row[0] = (last, recording.duration, level.encode(), text)

@@ -355,7 +355,8 @@ class RecordingWriter:
             self._written = self._flushed
             self._failure = DiskFault(
                 f"{error}; the {self._flushed} samples until then are in the file, as counts: "
-                f"free some space, then finish it with dearig recover {self._path}"
+                f"free some space, then recover it",
+                command=("recover", str(self._path)),
             )
             raise self._failure from error
 

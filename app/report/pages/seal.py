@@ -55,8 +55,9 @@ def check_page(page: str, name: str) -> None:
     seal = _SEALED.search(page)
     if seal is None or not page.startswith(_HEAD):
         raise InputError(
-            f"{name} is no report of this program, or one of an earlier version; give a file that "
-            f"--report wrote, such as report.html, or write the report again"
+            f"{name} is no report of this program, or one of an earlier version; give the "
+            f"page of a fit or a diagnosis, such as report.html, or write the report again",
+            option="report",
         )
     body = page[: seal.start()]
     if seal[1] != _digest(body):
