@@ -55,7 +55,9 @@ def mathml(latex: str, display: bool = True) -> str:
     """
     from latex2mathml.converter import convert
 
-    return str(convert(latex, display="block" if display else "inline"))
+    made = str(convert(latex, display="block" if display else "inline"))
+    # in HTML the element needs no name space, and a page without addresses can be checked
+    return re.sub(r' xmlns="[^"]*"', "", made, count=1)
 
 
 def as_text(latex: str) -> str:
