@@ -26,7 +26,7 @@ from typer.exceptions import TyperException
 
 from dearig import log_file
 from dearig.acquisition.interrupts import ends_program, ignore_interrupts
-from dearig.cli import campaign, files, fit, hold, laws, run, study, tools, track, trends, watch
+from dearig.cli import campaign, files, fit, hold, run, study, tools, track, trends, watch
 from dearig.cli.last_words import (
     LastingStream,
     leave,
@@ -52,7 +52,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _group in (run, track, hold, campaign, watch, files, fit, laws, study, trends, tools):
+for _group in (run, track, hold, campaign, watch, files, fit, study, trends, tools):
     app.add_typer(_group.commands)
 
 
