@@ -20,6 +20,7 @@ __all__ = [
     "Judgement",
     "is_rejected",
     "judge",
+    "p_text",
     "smallest_p",
 ]
 
@@ -112,3 +113,8 @@ def smallest_p(values: Iterable[float | None]) -> float | None:
     """Return the probability of the least of several independent ``values``; None for none."""
     known = [p for p in values if p is not None]
     return min(1.0, len(known) * min(known)) if known else None
+
+
+def p_text(p: float) -> str:
+    """Return a probability as "p = 0.02"; below the precision of a number as "p < 1e-15"."""
+    return f"p = {p:.1g}" if p >= 1e-15 else "p < 1e-15"

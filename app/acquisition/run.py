@@ -76,8 +76,9 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
             raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
         if not rig_file.film.name:
             raise InputError(
-                f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, "
-                f"so that its limits are those of the film on the rig"
+                f"rig {address!r}: no film is declared; give a rig file whose [film] has a name, "
+                f"so that its limits are those of the film on the rig",
+                option="rig_file",
             )
         checked = check_rig(address, rig_file)
         checked.refuse_without_watchdog()
@@ -478,10 +479,12 @@ class _Run:
         elif self._clock() - self._waiting_since > _TELL_AFTER:
             self._waiting_since = math.inf
             recorder = self._recorder
+            left = recorder.received - recorder.samples
+            what = f"{left} of {recorder.received} samples are" if left else "the file's end is"
             log.warning(
-                "the output is at 0 V; %d of %d samples are still being written to %s; press "
-                "ctrl-C twice to stop waiting for the disk",
-                recorder.received - recorder.samples, recorder.received, recorder.path,
+                "the output is at 0 V; %s still being written to %s; press ctrl-C twice to stop "
+                "waiting for the disk",
+                what, recorder.path,
             )  # fmt: skip
         return asked - self._asked_before >= _GIVE_UP
 

@@ -33,7 +33,7 @@ from dearig.analysis.readings.enough import check_enough, extrapolated, few_data
 from dearig.analysis.readings.opening import Source, check_named_once
 from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
 from dearig.analysis.readings.room import air_texts_of, room_texts
-from dearig.config.modelfile import ModelFile
+from dearig.config.modelfile import HELD_VOLTAGE, ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence, parse_sequence
 from dearig.errors import (
@@ -554,6 +554,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
         "verdict": outcome.verdict,
         "status": outcome.status,
         "interrupted": finding.interrupted,
+        HELD_VOLTAGE: finding.held,
         "recommended": "final" if outcome.recommends_final else "baseline",
         "mean_square_over_noise": stage.cost,
         f"noise_floor_{shown.suffix}": outcome.noise * shown.error_factor,

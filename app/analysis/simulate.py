@@ -87,7 +87,7 @@ def simulate_model(
             kinematics=drive.kinematics,
             sequence_toml=drive.sequence_toml,
         )
-    driven = Readings(drive, voltage).voltage
+    driven = Readings(drive, voltage, given.assumes_held_voltage).voltage
     values, field_max, pull_in = _actuator(given.model, driven)
     return Prediction(
         title=title,

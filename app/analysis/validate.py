@@ -32,7 +32,8 @@ def validate_model(
     comparisons = []
     for i, readings in enumerate(opened):
         role = "train" if readings.recording.sha256 in given.fitted else "validation"
-        comparisons.append(compare(readings, given.model, role))
+        used = readings.held() if given.assumes_held_voltage else readings
+        comparisons.append(compare(used, given.model, role))
         progress("validation", (i + 1) / len(opened))
     return ValidateOutcome(
         title=f"{given.name} on {len(opened)} recording{'s' if len(opened) > 1 else ''}",

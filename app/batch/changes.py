@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 
-from dearig.extras import import_extra
-
 __all__ = ["RUNS_MIN", "find_jumps", "jump_penalty"]
 
 #: Runs between two changes, at least: fewer are outliers, not a level.
@@ -25,13 +23,28 @@ def jump_penalty(runs: int, series: int) -> float:
 def find_jumps(values: np.ndarray, penalty: float) -> list[int]:
     """Return the places before which the level of ``values`` (n,) jumps, in deviations.
 
-    The levels minimise the sum of squares plus a ``penalty`` for each jump (the algorithm PELT of
-    ruptures).
+    The levels minimise the sum of squares plus a ``penalty`` for each jump, over all places, by
+    dynamic programming: B. Jackson et al., "An algorithm for optimal partitioning of data on an
+    interval", IEEE Signal Process. Lett. 12 (2005). A level has ``RUNS_MIN`` runs or more.
     """
-    if values.size < 2 * RUNS_MIN:
+    count = values.size
+    if count < 2 * RUNS_MIN:
         return []
-    ruptures = import_extra("ruptures", "trends", "a search for change points")
-    search = ruptures.KernelCPD(kernel="linear", min_size=RUNS_MIN)
-    # its sums of squares lose digits where the level is far from 0
-    found = search.fit((values - values.mean())[:, None]).predict(pen=penalty)
-    return [int(end) for end in found[:-1]]
+    # sums of squares lose digits where the level is far from 0
+    centred = values - values.mean()
+    sums, squares = (np.append(0.0, np.cumsum(centred**power)) for power in (1, 2))
+    best = np.full(count + 1, np.inf)  # least cost of the first runs, by their number
+    best[0] = -penalty
+    last = np.zeros(count + 1, dtype=np.int64)  # place of the last jump before them
+    for end in range(RUNS_MIN, count + 1):
+        places = np.arange(end - RUNS_MIN + 1)
+        within = squares[end] - squares[places] - (sums[end] - sums[places]) ** 2 / (end - places)
+        costs = best[places] + np.maximum(within, 0.0) + penalty
+        last[end] = np.argmin(costs)
+        best[end] = costs[last[end]]
+    found: list[int] = []
+    place = int(last[count])
+    while place > 0:
+        found.append(place)
+        place = int(last[place])
+    return found[::-1]

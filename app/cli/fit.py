@@ -360,7 +360,8 @@ def diagnose(
 def _raise_early_end(outcome: DiagnoseOutcome) -> None:
     """Raise the error that ended the runs or the search early, if one did."""
     if outcome.ended is not None and not isinstance(outcome.ended, Interrupted):
-        raise type(outcome.ended)(f"{outcome.ended}; the results found before that were kept")
+        ended = outcome.ended
+        raise type(ended)(f"{ended}; the results found before that were kept") from ended
     if outcome.finding.interrupted:
         raise Interrupted("interrupted: the results found before that were kept")
 
@@ -401,7 +402,7 @@ def simulate(
         written = save_prediction(prediction, out, force)
     print_line(console, str(written))
     if prediction.field_max is not None:
-        limit = "no static pull-in: the springs stiffen first"
+        limit = "no static pull-in if the springs stiffen as the model's locking limits have it"
         if prediction.pull_in is not None:
             limit = f"static pull-in at {prediction.pull_in * 1e-3:.3g} kV"
         print_line(console, f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; {limit}")

@@ -23,6 +23,7 @@ from dearig.recording.files import check_output, replaced_when_done
 
 __all__ = [
     "FORMAT",
+    "HELD_VOLTAGE",
     "ModelFile",
     "SpringName",
     "load_actuator",
@@ -43,6 +44,9 @@ if TYPE_CHECKING:
     SpringName = str
 else:
     SpringName = Literal[SPRINGS]
+
+#: Key of a model's history: whether the voltage was assumed to be held between the samples.
+HELD_VOLTAGE = "voltage_held"
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,14 @@ class ModelFile:
         train = self.history.get("train")
         tables = train if isinstance(train, list) else []
         return frozenset(str(t["sha256"]) for t in tables if isinstance(t, dict) and "sha256" in t)
+
+    @property
+    def assumes_held_voltage(self) -> bool:
+        """Whether it was fitted as if the voltage were held from each row of a table to the next.
+
+        Predictions and errors with this model then assume the same.
+        """
+        return self.history.get(HELD_VOLTAGE) is True
 
 
 class _Film(Table):
@@ -182,8 +194,8 @@ def load_model(path: str | Path) -> ModelFile:
                 f"or identify the model again with this one"
             )
         raise InputError(
-            f'{name} has no line format = "{FORMAT}": it is not a model file, as dearig identify '
-            f"writes them"
+            f'{name} has no line format = "{FORMAT}": it is not a model file, as a fit writes them',
+            command=("identify",),
         )
     try:
         file = _File.model_validate(data)

@@ -152,7 +152,7 @@ def allowed(info: FieldInfo, item: bool = False) -> str:
             metadata = inner
         elif kind is float:
             return f"a list such as [6.0, 6.5], each {_bounded('a number', inner)}"
-    words = {float: "a number", int: "a whole number", str: "a text"}
+    words = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
     text = words.get(kind, "a table") if isinstance(kind, type) else "a table"
     return _bounded(text, metadata, info.examples)
 

@@ -40,7 +40,7 @@ from dearig.model.verdict import (
 
 __all__ = ["Conclusion", "conclude", "unnamed_of"]
 
-_ITERATIONS = 8  # of the last fits, on every sample
+_ITERATIONS = 60  # of the last fits, on every sample: all that have a valley to end in end before
 
 
 class Conclusion:

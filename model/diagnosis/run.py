@@ -76,7 +76,8 @@ def diagnose(
     if as_held and found.status != "stopped" and _may_be_held(found, search, as_held):
         other, again = searched(as_held, part)
         found.judge.see([found.best, other.best])
-        held = _score(found, other.best) < _score(found, found.best)
+        # what the records declare needs the odds that every other choice needs to be doubted
+        held = _score(found, other.best) + search.settings.odds < _score(found, found.best)
         if held:
             found, search = other, again
     progress("final fits", _LAST)

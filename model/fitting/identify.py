@@ -28,7 +28,7 @@ from dearig.model.fitting.thinning import thinned
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
-from dearig.model.verdict import is_rejected, smallest_p
+from dearig.model.verdict import is_rejected, p_text, smallest_p
 
 __all__ = [
     "METHODS",
@@ -189,10 +189,10 @@ def _result(
     correlation = correlation_time(fit.residuals)
     warnings = []
     p = _misfit_p(problem, fit.residuals)
-    if is_rejected(p):
+    if p is not None and is_rejected(p):
         warnings.append(
             f"the model is rejected: noise as that at rest leaves such a residual with "
-            f"p = {p:.1g}; the intervals hold only if the model were right; run a diagnosis"
+            f"{p_text(p)}; the intervals hold only if the model were right; run a diagnosis"
         )
     elif fit.cost > _MISFIT and p is None and method == "hybrid":
         warnings.append(

@@ -295,6 +295,7 @@ class TestRig:
         assert run.provenance["simulated"]
         assert parse_sequence(run.sequence_toml, "x", Path()).sequence.name in found["performed"][0]
 
+    @pytest.mark.deep
     def test_no_more_than_was_asked_for(self, bench, tmp_path, monkeypatch):
         far = replace(RIVAL, effects=(("amplifier lag", (("time_constant", 0.05),)),))
         doubt = replace(OPEN, rivals=(("amplifier", far),))

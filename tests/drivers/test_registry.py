@@ -152,6 +152,7 @@ def test_a_rig_that_another_distribution_brings_records(installed, tmp_path):
     assert "not asked: acme-laser is not simulated" in checked
 
 
+@pytest.mark.deep
 def test_what_fails_is_a_sentence_at_the_command_line(installed, tmp_path):
     (tmp_path / "rest.toml").write_text(SEQUENCE, encoding="utf-8")
     (tmp_path / "rig.toml").write_text('[film]\nname = "film 3"\n', encoding="utf-8")

@@ -18,6 +18,7 @@ from dearig.model.verdict import (
     UNEXPLAINED,
     Judgement,
     judge,
+    p_text,
 )
 
 BETTER = (4.4, 1.1)  # cross-validation error over the noise, before and after
@@ -87,3 +88,9 @@ def test_a_better_prediction_that_is_not_yet_noise_is_a_part():
     assert judge(EXPLAINED, COMPLETE, [1.0], [1.1], BETTER, gain=0.0).verdict == EXPLAINED
     # where nothing was added nothing can be confirmed
     assert judge(NOTHING_MISSING, COMPLETE, [1.0], [6.2], BETTER).verdict == PARTLY_EXPLAINED
+
+
+def test_a_probability_is_written_as_far_as_a_number_knows_it():
+    assert p_text(0.0213) == "p = 0.02"
+    assert p_text(3e-12) == "p = 3e-12"
+    assert p_text(0.0) == "p < 1e-15"

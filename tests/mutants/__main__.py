@@ -23,7 +23,10 @@ from tests.mutants.changes import Mutant, mutants_of
 ROOT = Path(__file__).parents[2]
 #: What is changed (a file, or all files of a folder), and the tests that stand for it.
 MODULES = {
-    "drivers/gate.py": ("tests/drivers/test_gate.py", "tests/drivers/test_gate_windows.py"),
+    "drivers/gate.py": (
+        "tests/drivers/test_gate.py", "tests/drivers/test_gate_windows.py",
+        "tests/drivers/test_block_gate.py",
+    ),
     "drivers/interlocks.py": (
         "tests/drivers/test_interlocks.py", "tests/drivers/test_interlock_blocks.py",
     ),

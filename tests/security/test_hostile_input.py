@@ -64,7 +64,10 @@ DEEP = {
     "2 MB of words", "2 MB of dots", "2 MB of digits", "2 MB of spaces", "2 MB of comments",
     "quoted parts", "spaced parts", "number with underscores", "a name of 50 MB",
     "checked, instruments by the thousand", "JSON of 1,000,000 arrays",
-    "JSON of 1,000,000 objects", "80,000 channels", "100,000 tables",
+    "JSON of 1,000,000 objects", "80,000 channels", "100,000 tables", "2 MB of line ends",
+    "2 MB of quotation marks", "200,000 levels", "a key of 1 MB", "a kind of 1 MB",
+    "900 brackets", "a header of 100,000 parts", "tables in tables", "10,000 effects",
+    "CSV of line ends", "CSV of quotation marks", "rig file of 50 MB",
 }  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
 from dearig.sim_backend.rig import OUTPUT_STARVED
 from dearig.sim_backend.signal_path import CHUNK
+from tests.deep import mostly_deep
 
 RATE = 1000.0
 SIGNAL_FAULTS = (
@@ -229,7 +230,10 @@ def test_a_fault_leaves_what_came_before_as_it_is(kind):
     assert not np.array_equal(record.counts, healthy.counts)
 
 
-@pytest.mark.parametrize("kind", SIGNAL_FAULTS)
+@pytest.mark.parametrize(
+    "kind",
+    mostly_deep(SIGNAL_FAULTS, [FaultKind.ARC, FaultKind.SENSOR_STUCK, FaultKind.MONITOR_WIRE_OFF]),
+)
 def test_blocks_chunks_and_a_second_rig_change_nothing(kind):
     # over the border between two chunks
     fault = f"{kind}@{(CHUNK - 5) / RATE}"

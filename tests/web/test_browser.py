@@ -50,7 +50,7 @@ def test_a_browser_draws_what_the_stream_says(address: str, tmp_path: Path) -> N
 
         assert text("#simulated") == "SIMULATED"
         assert text("#status") == "RECORDING"
-        assert text("#connection") == "live"
+        assert text("#connection") == "connected"
         assert re.match(r"measured \d+\.\d s ago|STALE: no new data for \d+", text("#age"))
         assert browser.evaluate("document.querySelectorAll('.value .number').length") == 4
         assert text("#recording-time") == "1.5 s of 3.0 s"

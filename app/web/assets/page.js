@@ -162,7 +162,7 @@ function showAge() {
   const lost = heard === 0 ? null : quiet > LOST_MS;
   body.classList.toggle("lost", lost === true);
   if (lost === true) badge("connection", `connection lost ${ago(quiet / 1000)} ago`, "bad");
-  else badge("connection", heard === 0 ? "connecting" : "live", heard === 0 ? "off" : "ok");
+  else badge("connection", heard === 0 ? "connecting" : "connected", heard === 0 ? "off" : "ok");
   const recording = state && state.recording;
   if (!recording || age === null) {
     put("age", "");

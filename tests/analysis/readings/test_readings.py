@@ -14,10 +14,11 @@ from dearig.analysis import diagnose as diagnosis
 from dearig.analysis.readings import record
 from dearig.analysis.readings.opening import open_all
 from dearig.analysis.readings.record import Readings, read_all
+from dearig.analysis.simulate import simulate_model
 from dearig.analysis.study import Task, study
 from dearig.analysis.summary import assess
 from dearig.analysis.validate import validate_model
-from dearig.config.modelfile import save_model
+from dearig.config.modelfile import load_model, save_model
 from dearig.errors import InputError
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator, Drive
@@ -145,6 +146,23 @@ def test_holding_the_voltage_changes_the_drive_alone(folder):
     assert held.noise is readings.noise
     assert (linear.drive.hold, held.record.drive.hold) == (False, True)
     assert held.recording.sha256 == readings.recording.sha256
+
+
+@pytest.mark.usefixtures("searched")
+def test_a_model_carries_that_its_voltage_was_taken_as_held(folder, tmp_path):
+    out = tmp_path / "held.toml"
+    done("diagnose", folder / "a.h5", "--validate", folder / "c.h5", "--model-out", out)
+    given = load_model(out)
+    assert given.assumes_held_voltage
+    held = validate_model(given, [folder / "c.h5"]).comparisons[0]
+    linear = validate_model(replace(given, history={}), [folder / "c.h5"]).comparisons[0]
+    drive = Readings(*open_all([folder / "c.h5"])).held().voltage
+    expected = given.model.simulate(drive).displacement
+    assert np.ptp(held.model - expected) == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(linear.model - expected) > 1e-7
+    # and so does what it predicts
+    assert simulate_model(given, folder / "c.h5").hold
+    assert not simulate_model(replace(given, history={}), folder / "c.h5").hold
 
 
 def test_each_drive_is_inspected_for_itself(folder):

@@ -50,6 +50,10 @@ class Measurement:
 
 
 MEASUREMENTS = {
+    "tests": Measurement(
+        "What the tests cost and notice",
+        ("tests.benchmarks.bench_suite b2a0705 HEAD", "tests.mutants --count 8 --seed 1"),
+    ),
     "kernel": Measurement(
         "Speed of the model's kernel",
         ("tests.benchmarks.bench_kernel",),

@@ -300,6 +300,7 @@ def test_indistinguishable_effects_are_reported_as_such():
         assert rival.effects != found.final.model.effects
 
 
+@pytest.mark.deep
 def test_a_residual_of_no_family_is_described():
     truth = replace(PLAIN, effects=effect("sudden change of force", stress=30.0, moment=6.3))
     found = diagnose([record_of(truth)], PLAIN, workers=1)
@@ -404,6 +405,7 @@ def test_an_interrupted_search_returns_what_it_has_found():
     assert found.before[0].rms == found.after[0].rms > 3.0 * NOISE
 
 
+@pytest.mark.deep
 def test_a_search_stops_at_its_computing_budget():
     record = record_of(plant("load inertia"))
     whole = of_hidden("load inertia")

@@ -186,6 +186,7 @@ def after_rest(way: np.ndarray) -> ActuatorRecord:
     return replace(plain, displacement=reading, noise=noise, lead_in=400)
 
 
+@pytest.mark.deep
 def test_a_load_that_swings_at_rest_is_not_taken_for_noise() -> None:
     time = np.arange(400 + thesis_drive().time.size) / 100.0
     swing = 2e-5 * 2.0 ** (-time / 4.0) * np.sin(2.0 * np.pi * 3.4 * time)

@@ -31,6 +31,7 @@ from dearig.model.film.material import THESIS_FILM
 from dearig.model.simulation.actuator import Drive, at_rest, initial_state
 from dearig.model.simulation.strip import Strip
 from dearig.sim_backend.model_plant import ModelPlant
+from tests.deep import mostly_deep
 from tests.tools.effect_cases import (
     BOTH,
     BY_STRETCH,
@@ -215,7 +216,14 @@ SPLITTING = {
 }
 
 
-@pytest.mark.parametrize("name", OF_FILM)
+#: Those whose equations take seconds, each of a family of which the suite has another.
+LONG = {
+    "distributed hysteresis", "general hysteresis", "elastoplastic friction", "general softening",
+    "general friction", "first-loading damage",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", mostly_deep(OF_FILM, set(OF_FILM) - LONG))
 def test_against_the_oracle(name):
     film = Film(THESIS)
     values = numbers(name, 5.0)

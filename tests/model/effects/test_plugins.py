@@ -150,6 +150,7 @@ def test_the_compiled_kernels_are_those_of_this_source(tmp_path):
     assert folder != other
 
 
+@pytest.mark.deep
 def test_an_effect_that_is_left_out_for_now_has_kernels_of_its_own(tmp_path):
     needs = "import lab_needed\n"
     add_distribution(tmp_path, "lab-drag", {"lab_drag": made_effect("lab drag")})

@@ -161,6 +161,7 @@ def film_record(seed=0, noise=20.0, effects=()):
     return network, FilmRecord("film", time, stretch, stress, noise)
 
 
+@pytest.mark.deep
 def test_what_a_film_lacks_does_not_decide_whether_its_springs_stiffen():
     network, record = film_record(effects=effect("slack", looseness=1.0))
     fits = []
@@ -173,6 +174,7 @@ def test_what_a_film_lacks_does_not_decide_whether_its_springs_stiffen():
     assert all(fit.held_limits == () for fit in fits)
 
 
+@pytest.mark.deep
 def test_a_film_of_two_branches_is_found_again():
     network, record = film_record()
     fit = identify([record], Strip(network), intervals=False)

@@ -25,6 +25,7 @@ from nidaqmx.errors import DaqError, RpcError
 from nidaqmx.system import Device
 
 from dearig.sim_backend.clock import ManualClock, PacedClock
+from tests.deep import mostly_deep
 from tests.tools.certificates import make_certificates, needs_openssl
 from tests.tools.daqmx import (
     HandClock,
@@ -62,7 +63,7 @@ def clocked(card: Served) -> nidaqmx.Task:
 # threads
 
 
-@pytest.mark.parametrize("event", ["done", "samples"])
+@pytest.mark.parametrize("event", mostly_deep(["done", "samples"], ["samples"]))
 def test_who_listens_takes_no_thread_from_others_and_one_too_many_is_told_so(event: str) -> None:
     def listen(made: nidaqmx.Task) -> None:
         if event == "done":
@@ -207,7 +208,9 @@ def test_a_number_that_is_none_is_refused_in_every_call(channel: grpc.Channel) -
         assert outcome == (grpc.StatusCode.UNKNOWN, BAD_VALUE), (name, field)
 
 
-@pytest.mark.parametrize("data", [b"\xff" * 40, b"\x0a", b"\x0a\x7f1", b""])
+@pytest.mark.parametrize(
+    "data", mostly_deep([b"\xff" * 40, b"\x0a", b"\x0a\x7f1", b""], [b"\x0a\x7f1", b""])
+)
 def test_bytes_that_are_no_message_and_empty_ones_are_answered(
     channel: grpc.Channel, data: bytes
 ) -> None:
