@@ -449,7 +449,7 @@ class CampaignPage(Page):
         folder = dialogs.choose_folder(
             self, self._session, "Continue a campaign", self._session.folder
         )
-        if folder is not None and (self._folder is not None or self.plan.confirm_discard()):
+        if folder is not None and (self._folder is not None or self.plan.files.confirm_discard()):
             self.open_campaign(folder)
 
     @Slot()

@@ -35,7 +35,7 @@ class TargetEditor(TomlEditor):
         """Read a target (.toml), or make one of a table (.csv)."""
         if path.suffix.lower() not in _TABLES:
             super().open_file(path)
-        elif self.confirm_discard():
+        elif self.files.confirm_discard():
             segment = {"kind": "csv", "file": path.name}
             text = tomli_w.dumps({"name": path.stem, "segment": [segment]})
             self.restore(text, TextFile("target", text, None, path.parent))

@@ -82,7 +82,7 @@ def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path
     page.branches.setValue(1)
 
     found = studied(page, qtbot)
-    assert not page.cancel.isEnabled()
+    assert not page.job.cancel_button.isEnabled()
     assert page.headline.text() == "lobes of 4.0 kV, 1 branch"
     assert "not used in the fit" in words(page.verdict)
     # what only a diagnosis has is not there
@@ -124,10 +124,12 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
 
     # a search that is cancelled at once leaves nothing either
     click(qtbot, page.start)
-    qtbot.waitUntil(lambda: page.bar.value() > 0 or page.message.text() != "", timeout=_PATIENCE)
+    qtbot.waitUntil(
+        lambda: page.job.bar.value() > 0 or page.message.text() != "", timeout=_PATIENCE
+    )
     assert page.message.text() == ""
-    click(qtbot, page.cancel)
-    click(qtbot, page.cancel)
+    click(qtbot, page.job.cancel_button)
+    click(qtbot, page.job.cancel_button)
     assert page.message.text() == "Cancelled; nothing was saved."
     assert not list(session.folder.glob("study-*"))
     assert page.start.isEnabled()
@@ -158,8 +160,8 @@ def test_a_study_is_reopened_and_the_old_result_is_labelled(session, keep, qtbot
     click(qtbot, page.start)
     assert page.headline.text() == f"Previous result: {shown}"
     assert page.about.text().startswith("This is study-1, ")
-    click(qtbot, page.cancel)
-    click(qtbot, page.cancel)
+    click(qtbot, page.job.cancel_button)
+    click(qtbot, page.job.cancel_button)
     assert page.message.text() == "Cancelled; nothing was saved."
     assert page.headline.text().startswith("Previous result: ")
 
