@@ -20,7 +20,6 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.errors import SafetyStop
 from dearig.report.study_file import save_study
 from dearig.report.study_view import view_of
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
@@ -170,7 +169,7 @@ def test_a_recording_that_ended_in_an_arc_is_marked_and_warned_of(session, keep,
     arc = session.folder / "arc.h5"
     loaded = parse_sequence(LOBES.format(top=6.0), "arc", Path())
     with pytest.raises(SafetyStop):
-        record(loaded, "sim", RigFile(), arc, RunOptions(faults=FaultPlan.parse(["arc@1.7"])))
+        record(loaded, "sim", RigFile(), arc, RunOptions(faults=["arc@1.7"]))
     page = open_page(session, keep, qtbot)
     name = page.recordings.item(0, 0)
     assert not page.warning.isVisible()
