@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dearig.batch.changes import find_jumps, jump_penalty
+from dearig.batch.film_effects import find_jumps, jump_penalty
 from dearig.batch.mixed_model import Sample, fit_linear
 from dearig.batch.table_file import read_table, write_csv, write_parquet
 from dearig.batch.trends import Trends, find_trends
