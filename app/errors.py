@@ -2,21 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 from dearig.output_state import OutputState
 
 __all__ = [
     "DearigError",
     "DiskFault",
+    "Hints",
     "InputError",
     "InstrumentFault",
     "Interrupted",
     "NotSafe",
+    "Note",
     "SafetyStop",
+    "hints_of",
 ]
 
 
-class DearigError(Exception):
+class Hints:
+    """Names of what a text is about, which each face of the program words in its own way.
+
+    ``options`` are names of values that a person can give, such as ``gauge_length_mm``: an option
+    of the command, a field of the window, an argument in Python. ``command`` is a command of the
+    program that helps, with its arguments, () for none; the ``options`` are then those of it.
+    """
+
+    options: tuple[str, ...] = ()
+    command: tuple[str, ...] = ()
+
+
+class Note(str, Hints):
+    """Text for a person, with the options and the command that it is about."""
+
+    __slots__ = ("command", "options")
+
+    def __new__(
+        cls, text: str, option: str | Iterable[str] = (), command: Sequence[str] = ()
+    ) -> Note:
+        """Return ``text`` with one ``option`` or several, and a ``command`` that helps."""
+        note = super().__new__(cls, text)
+        note.options = (option,) if isinstance(option, str) else tuple(option)
+        note.command = tuple(command)
+        return note
+
+
+class DearigError(Exception, Hints):
     """An error whose text tells the operator what happened, where, and what to do.
+
+    The text names no option of a command and no field of the window: ``option``, a name or
+    several, and ``command`` say what each face adds to it (``Hints``).
 
     ``output_state`` is what is known of the rig's output where the error ended a run, and None
     where no rig was contacted.
@@ -24,6 +59,13 @@ class DearigError(Exception):
 
     exit_code = 1
     output_state: OutputState | None = None
+
+    def __init__(
+        self, *text: object, option: str | Iterable[str] = (), command: Sequence[str] = ()
+    ) -> None:
+        super().__init__(*text)
+        self.options = (option,) if isinstance(option, str) else tuple(option)
+        self.command = tuple(command)
 
     @property
     def needs_inspection(self) -> bool:
@@ -72,3 +114,14 @@ class Interrupted(DearigError):  # noqa: N818
     """The operator stopped the work; after a run the rig was made safe."""
 
     exit_code = 130
+
+
+def hints_of(text: str | BaseException) -> list[Hints]:
+    """Return the hints of a text or an error, and of the errors that it was raised from."""
+    found: list[Hints] = []
+    cause: object = text
+    while isinstance(cause, Hints):
+        if cause.options or cause.command:
+            found.append(cause)
+        cause = cause.__cause__ if isinstance(cause, DearigError) else None
+    return found

@@ -34,12 +34,13 @@ def files_in(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def test_every_folder_with_an_init_is_a_listed_package() -> None:
+def test_every_folder_that_python_can_import_is_a_listed_package() -> None:
+    # setuptools says of a folder of data that is not listed that it would be ignored
     found = {
         ".".join((name, *path.parent.relative_to(ROOT / folder).parts))
         for folder, name in FOLDERS.items()
         for path in files_in(ROOT / folder)
-        if path.name == "__init__.py"
+        if all(part.isidentifier() for part in path.parent.relative_to(ROOT / folder).parts)
     }
     assert found == set(PROJECT["tool"]["setuptools"]["packages"])
 

@@ -47,8 +47,9 @@ class Original:
         """
         if rig_file is not None:
             raise InputError(
-                f"--rig-file {rig_file} cannot be used with --like {self.path} on a simulated rig: "
-                f"the recording has its own rig file; leave --rig-file out"
+                f"rig file {rig_file} cannot be used to repeat {self.path} on a simulated rig: the "
+                f"recording has its own rig file; leave the other one out",
+                option=("rig_file", "like"),
             )
         return self.rig_file
 
@@ -62,7 +63,8 @@ class Original:
             raise InputError(
                 f"rig {rig!r} is not simulated: only the sequence of {self.path} can be repeated "
                 f"on it, and a recording of another rig knows neither its scaling nor its limits; "
-                f"give the rig's own file with --rig-file"
+                f"give the rig's own file",
+                option="rig_file",
             )
         if not self.configuration:
             return (f"{self.path} holds no rig file, so nothing was compared",)
@@ -79,7 +81,8 @@ class Original:
         if (self.film, self.load) != (rig_file.as_film(), rig_file.as_load()):
             raise InputError(
                 f"{self.path} was made with the film and load of a model file, which differ from "
-                f"those of its rig file: give the model file with --model"
+                f"those of its rig file: give the model file too",
+                option="model",
             )
 
 
@@ -97,7 +100,8 @@ def original_of(path: str | Path) -> Original:
     if "feedback" in noted:
         raise InputError(
             f"{path} was corrected while it was recorded: its voltage followed the readings, and "
-            f"its sequence alone does not repeat it; use dearig hold again"
+            f"its sequence alone does not repeat it; hold the displacement again",
+            command=("hold",),
         )
     configuration = str(noted.get("configuration", ""))
     name = f"the rig file in {path}"

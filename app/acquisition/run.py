@@ -76,8 +76,9 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
             raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
         if not rig_file.film.name:
             raise InputError(
-                f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, "
-                f"so that its limits are those of the film on the rig"
+                f"rig {address!r}: no film is declared; give a rig file whose [film] has a name, "
+                f"so that its limits are those of the film on the rig",
+                option="rig_file",
             )
         checked = check_rig(address, rig_file)
         checked.refuse_without_watchdog()

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Serving", "TlsFiles", "needs_simulated_card", "serve"]
 
+_TLS = ("tls_cert", "tls_key", "tls_client_ca")  # names of the options
 _POLL_S = 0.1  # s between two checks for ctrl-C
 
 
@@ -127,7 +128,8 @@ def serve(
             except OSError as error:
                 raise InputError(
                     f"port {port} on {host} cannot be listened on: another program may have it, or "
-                    f"the host is not one of this computer's; --port 0 takes any that is free"
+                    f"the host is not one of this computer's; port 0 takes any that is free",
+                    option="port",
                 ) from error
             named = f"[{host}]" if ":" in host else host
             rig = f"daqmx:{device.name}@{named}:{found}"
@@ -149,7 +151,7 @@ def _signals(texts: Sequence[str] | None) -> dict[str, str] | None:
     for text in texts:
         terminal, equals, signal = text.partition("=")
         if not equals:
-            raise ValueError(f"--signal {text!r}: write it as PFI8='1 kHz, 25 %'")
+            raise ValueError(f"signal {text!r}: write it as PFI8='1 kHz, 25 %'")
         signals[terminal] = signal
     return signals
 
@@ -170,30 +172,36 @@ def _certificates(host: str, anywhere: bool, tls: TlsFiles) -> Certificates | No
     Raises ``InputError`` where it may not.
     """
     if (tls.cert is None) != (tls.key is None):
-        raise InputError("--tls-cert and --tls-key belong together; give both")
+        raise InputError(
+            "a certificate and its key belong together; give both", option=("tls_cert", "tls_key")
+        )
     if tls.client_ca is not None and tls.cert is None:
-        raise InputError("--tls-client-ca needs --tls-cert and --tls-key, the server's own")
+        raise InputError(
+            "a CA of the clients needs the server's own certificate and key",
+            option=("tls_cert", "tls_key"),
+        )
     if not is_loopback(host):
         if not anywhere:
             raise InputError(
-                f"--host {host} can be reached from other computers: every program that reaches "
-                f"the port can drive the rig; if that is intended, add --anywhere and the TLS "
-                f"options"
+                f"host {host} can be reached from other computers: every program that reaches "
+                f"the port can drive the rig; if that is intended, allow it, with certificates",
+                option=("anywhere", *_TLS),
             )
         if tls.client_ca is None:
             raise InputError(
-                f"--host {host} with --anywhere needs --tls-cert, --tls-key and --tls-client-ca: "
-                f"only clients with a certificate may drive the rig"
+                f"host {host} can be reached from other computers, and needs a certificate, its "
+                f"key and the CA of the clients: only clients with a certificate may drive the rig",
+                option=_TLS,
             )
     if tls.cert is None:
         return None
     try:
         return read_certificates(
             tls.client_ca or "", tls.cert, tls.key or "",
-            ("--tls-client-ca", "--tls-cert", "--tls-key"),
+            ("CA of the clients", "certificate", "key"),
         )  # fmt: skip
     except LinkRefused as error:
-        raise InputError(str(error)) from error
+        raise InputError(str(error), option=_TLS) from error
 
 
 def _security(certificates: Certificates | None) -> str:

@@ -84,7 +84,8 @@ def check_feasible(
         raise InputError(
             f"target {target.name!r} cannot be reached: {said}"
             + (f" (and {more} more)" if more > 0 else "")
-            + "; give another target, or use --nearest to follow the nearest feasible one"
+            + "; give another target, or follow the nearest feasible one",
+            option="nearest",
         )
 
 

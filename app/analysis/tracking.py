@@ -251,7 +251,7 @@ class Tracking:
         self._followed = model
         self._compare = compare
         self._given_up: tuple[Learner, ModelFile] | None = None
-        ours = _actuator(model, "--model")
+        ours = _actuator(model, "model")
         self.task = task_of(target, rig_file)
         self._iterations = iterations
         self._others: list[Proposal] = []
@@ -344,7 +344,7 @@ class Tracking:
 
     def _compared(self, compare: ModelFile) -> list[Proposal]:
         """Return the runs of a linear map and of another model, for the same reference."""
-        theirs = _actuator(compare, "--compare")
+        theirs = _actuator(compare, "compare")
         linear = _linear_map(self.task, self.inversion, theirs)
         found = invert(theirs, replace(self.task, target=self.inversion.reference))
         return [
@@ -364,7 +364,7 @@ class Tracking:
             return ()
         known = self.inversion.reachable & np.isfinite(run.measured)
         measured, other = run.measured[known], (run.measured - expected)[known]
-        found = readings_under(_actuator(self.model, "--model"), self.task, played.voltage)
+        found = readings_under(_actuator(self.model, "model"), self.task, played.voltage)
         off = math.inf
         for mine in (reading[known] for reading in found):
             scatter = 2.0 * run.noise * float(np.sqrt(np.sum((mine - expected[known]) ** 2)))
@@ -382,7 +382,7 @@ class Tracking:
     def _learner_of(self, compare: ModelFile) -> Learner:
         """Return a learner by the compared model, for the same reference."""
         task = replace(self.task, target=self.inversion.reference)
-        model = _actuator(compare, "--compare")
+        model = _actuator(compare, "compare")
         return Learner(model, task, alternatives=alternatives_of(compare))
 
     def _other_tried(self) -> tuple[str, ...]:
@@ -500,8 +500,9 @@ def _actuator(model: ModelFile, option: str) -> Actuator:
     if isinstance(model.model, Actuator):
         return model.model
     raise InputError(
-        f"{option}: the model {model.name!r} is of a bare film, which a voltage does not move: "
-        f"give one of an actuator"
+        f"the model {model.name!r} is of a bare film, which a voltage does not move: give one of "
+        f"an actuator",
+        option=option,
     )
 
 

@@ -10,6 +10,7 @@ from dearig.analysis.identify import identify_recordings
 from dearig.analysis.readings.opening import Source
 from dearig.analysis.simulate import simulate_model
 from dearig.analysis.validate import validate_model
+from dearig.api.arguments import named_arguments
 from dearig.api.models import ModelSource, as_model_file
 from dearig.api.predictions import Prediction
 from dearig.api.recordings import RigSource, load_rig
@@ -38,6 +39,7 @@ def _some(recordings: Recordings) -> list[Source]:
     return found
 
 
+@named_arguments
 def identify(
     recordings: Recordings,
     *,
@@ -125,6 +127,7 @@ def identify(
     return IdentifyResult(outcome)
 
 
+@named_arguments
 def validate(
     model: ModelSource,
     recordings: Recordings,
@@ -167,6 +170,7 @@ def validate(
     return ValidateResult(outcome)
 
 
+@named_arguments
 def simulate(
     model: ModelSource,
     drive: SequenceSource | Recording,
@@ -210,6 +214,7 @@ def simulate(
     return Prediction(found)
 
 
+@named_arguments
 def diagnose(
     recordings: Recordings,
     *,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from dearig.acquisition.run import RunOptions
 from dearig.analysis import hold as holding
 from dearig.analysis.hold import HoldOptions
+from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing, write_page
 from dearig.api.models import ModelSource, read_model
 from dearig.api.recordings import Recording, RigSource, load_rig, rig_provenance
@@ -122,6 +123,7 @@ class HoldResult:
         return f"Hold of {self.outcome.setpoint * 1e3:.4g} mm"
 
 
+@named_arguments
 def hold(
     displacement_mm: float,
     model: ModelSource,

@@ -18,6 +18,7 @@ from dearig.acquisition.rig_source import SOURCE, source_of
 from dearig.acquisition.run import RunOptions
 from dearig.acquisition.run import record as run
 from dearig.analysis.readings.compatibility import of_rig
+from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing, facts, write_page
 from dearig.api.models import ModelSource, read_model
 from dearig.api.sequences import SequenceSource, as_loaded
@@ -197,6 +198,7 @@ def open(path: str | Path) -> Recording:  # noqa: A001  (the name of the interfa
     return Recording.of(open_recording(path))
 
 
+@named_arguments
 def record(
     sequence: SequenceSource,
     *,

@@ -13,6 +13,7 @@ from dearig.acquisition.run import RunOptions
 from dearig.analysis.track import track as follow
 from dearig.analysis.track_target import plan_target
 from dearig.analysis.tracking import TrackedRun, TrackOutcome
+from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing, facts, table_html, write_page
 from dearig.api.models import ModelSource, read_model
 from dearig.api.recordings import Recording, RigSource, load_rig, rig_provenance
@@ -281,6 +282,7 @@ class TrackResult:
         )
 
 
+@named_arguments
 def invert(
     model: ModelSource, target: TargetSource, *, rig_file: RigSource | None = None
 ) -> Inversion:
@@ -324,6 +326,7 @@ def invert(
     return Inversion(loaded.name, plan_target(loaded, file.model, settings))
 
 
+@named_arguments
 def track(
     target: TargetSource,
     model: ModelSource,

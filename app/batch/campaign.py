@@ -38,6 +38,7 @@ from dearig.config.campaignfile import Campaign, PlannedRun, digest_of, settings
 from dearig.config.modelfile import load_actuator
 from dearig.config.notify import Notify
 from dearig.config.rigfile import RigFile
+from dearig.config.safe_ends import is_safe_end
 from dearig.config.sequencefile import LoadedSequence
 from dearig.errors import (
     DearigError,
@@ -151,8 +152,9 @@ def play_campaign(
         except (KeyboardInterrupt, Interrupted):
             left = len(session.queue.waiting) + (session.queue.running is not None)
             stop = Interrupted(
-                f"interrupted between two runs, at 0 V; {left} runs are left: continue the "
-                f"campaign with --resume"
+                f"interrupted between two runs, at 0 V; {left} runs are left; "
+                f"continue the campaign",
+                option="resume",
             )
             status, reason = "interrupted", str(stop)
         except Exception as error:
@@ -174,18 +176,21 @@ def _check_folder(folder: Path, resume: bool) -> None:
         raise InputError(f"{folder} is a file; give a folder for the campaign")
     entries = Queue.of(folder / JOURNAL) if folder.is_dir() else Queue()
     if resume and not entries.runs:
-        raise InputError(f"{folder} has no campaign to continue; leave --resume out to begin one")
+        raise InputError(
+            f"{folder} has no campaign to continue; leave that out to begin one", option="resume"
+        )
     if entries.runs and not resume:
         raise InputError(
             f"{folder} has the campaign {entries.name!r} with {entries.count(DONE)} of "
-            f"{len(entries.runs)} runs done; continue it with --resume, or give another folder"
+            f"{len(entries.runs)} runs done; continue it, or give another folder",
+            option="resume",
         )
     if (
         not resume
         and folder.is_dir()
         and any(p.name not in (JOURNAL, REQUESTS) for p in folder.iterdir())
     ):
-        raise InputError(f"{folder} is not empty; give another folder with --out")
+        raise InputError(f"{folder} is not empty; give another folder", option="out")
 
 
 def _check_arming(arming: Arming, address: str, left: bool) -> None:
@@ -199,8 +204,9 @@ def _check_arming(arming: Arming, address: str, left: bool) -> None:
     if (all(given) and arming.by) or (left and not any(given)):
         return
     raise InputError(
-        f"rig {address!r} carries high voltage while nobody may be beside it: say with --operator "
-        f"NAME, --runs N and --hours H who arms it, for how many runs, and for how long"
+        f"rig {address!r} carries high voltage while nobody may be beside it: say who arms "
+        f"it, for how many runs, and for how long",
+        option=("operator", "runs", "hours"),
     )
 
 
@@ -273,16 +279,19 @@ class _Session:
             self._settle()
             if queue.halted != seen:
                 # this halt was not shown yet: the acknowledgement is of another one
-                raise InputError(_halted(queue.halted))
+                raise _halted(queue.halted)
             if arming.acknowledged and not queue.halted:
                 raise InputError(
-                    f"there is nothing to acknowledge in {self._folder}: leave --acknowledge out"
+                    f"there is nothing to acknowledge in {self._folder}: leave that out",
+                    option="acknowledge",
                 )
             if queue.halted:
                 if not arming.acknowledged:
-                    raise InputError(_halted(queue.halted))
+                    raise _halted(queue.halted)
                 if not arming.by:
-                    raise InputError("--acknowledge needs --operator, the name of who looked")
+                    raise InputError(
+                        "an acknowledgement needs the name of who looked", option="operator"
+                    )
             _check_arming(arming, self._address, left=queue.armed and not queue.halted)
             if queue.halted:
                 self.note("acknowledged", by=arming.by, note=arming.acknowledged)
@@ -394,7 +403,7 @@ class _Session:
                 return ended
 
     def _left(self, why: str) -> str:
-        return f"{why}; {len(self.queue.waiting)} runs are left: arm them with --resume"
+        return f"{why}; {len(self.queue.waiting)} runs are left: arm them to continue"
 
     def _of_run(self, state: RunState) -> Progress:
         """Return a progress that says which run of how many it is."""
@@ -434,7 +443,8 @@ class _Session:
         try:
             loaded = self._admit(run, path)
         except InputError as error:
-            return "refused", f"run {run.name}: {error}", InputError(f"run {run.name}: {error}")
+            why = f"run {run.name}: {error}"
+            return "refused", why, InputError(why, option=error.options, command=error.command)
         self.note("started", run=run.name, attempt=attempt, recording=name)
         try:
             result = record(
@@ -472,7 +482,9 @@ class _Session:
             except InputError as error:
                 raise InputError(
                     f"with the film's present model ({self.queue.model}), {error}; leave the run "
-                    f"out with dearig campaign-queue {self._folder} --skip {run.name}"
+                    f"{run.name} out",
+                    command=("campaign-queue", str(self._folder)),
+                    option="skip",
                 ) from error
         return loaded
 
@@ -492,10 +504,17 @@ class _Session:
         if isinstance(error, InputError) and not path.exists():
             self.note("not-started", run=state.name, reason=str(error))
             reason = f"run {state.name}: {error}"
-            return "refused", reason, InputError(reason)
+            return (
+                "refused",
+                reason,
+                InputError(reason, option=error.options, command=error.command),
+            )
         self._output = error.output_state
         # nobody was there: what kept a run from its rig would keep the next one from it too
         looks = error.needs_inspection or error.output_state is None
+        safe = is_safe_end(error, self._campaign.repeat_after)
+        if safe and path.exists() and state.attempts <= self.queue.repeat_lost:
+            looks = False
         if looks:
             self._halt(f"run {state.name}: {error}")
         if not path.exists():
@@ -505,7 +524,7 @@ class _Session:
             self._end(state, how, str(error), tripped=looks)
         if looks:
             return "halted", self.queue.halted, error
-        if isinstance(error, DiskFault):
+        if safe or isinstance(error, DiskFault):
             return None
         status = "interrupted" if isinstance(error, Interrupted) else "refused"
         return status, str(error), error
@@ -557,10 +576,11 @@ class _Session:
         )
 
 
-def _halted(reason: str) -> str:
-    return (
-        f"the campaign is halted: {reason}; look at the rig and the film, and then continue with "
-        f'--resume --operator NAME --acknowledge "what was seen"'
+def _halted(reason: str) -> InputError:
+    return InputError(
+        f"the campaign is halted: {reason}; look at the rig and the film, and then continue, and "
+        f"say who looked and what was seen",
+        option=("resume", "operator", "acknowledge"),
     )
 
 

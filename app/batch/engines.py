@@ -63,7 +63,7 @@ class Engine(Protocol):
 def engine_at(
     where: str, workers: int | None = None, work: Callable[[Task], Row] | None = None
 ) -> Engine:
-    """Return the engine that ``--on`` names: local, or dask:ADDRESS. Raises ``InputError``.
+    """Return the engine that ``where`` names: local, or dask:ADDRESS. Raises ``InputError``.
 
     ``work`` computes a task; by default it is ``fit_task``.
     """
@@ -73,8 +73,9 @@ def engine_at(
     if scheme == "dask" and colon and address:
         return DaskEngine(address, work)
     raise InputError(
-        f"--on {where!r} is not known: write local, or dask:ADDRESS with the address of a Dask "
-        f"scheduler, such as dask:tcp://10.0.0.5:8786"
+        f"{where!r} is no place to compute at: write local, or dask:ADDRESS with the address of a "
+        f"Dask scheduler, such as dask:tcp://10.0.0.5:8786",
+        option="on",
     )
 
 
@@ -193,7 +194,7 @@ class DaskEngine:
 
     def __init__(self, address: str, work: Callable[[Task], Row] | None = None) -> None:
         self._work = work or _fit_task()
-        self._dask = import_extra("distributed", "cluster", "--on dask:ADDRESS")
+        self._dask = import_extra("distributed", "cluster", "a study at dask:ADDRESS")
         self._address = address
         self._client = self._connect()
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dearig.batch.changes import RUNS_MIN, find_jumps, jump_penalty
 from dearig.batch.mixed_model import LinearFit, Sample, fit_linear, with_extra, within_films
-from dearig.extras import import_extra
 
-__all__ = ["DIFFER", "RUNS_MIN", "Explained", "Extra", "explain", "find_jumps", "jump_penalty"]
+__all__ = ["DIFFER", "Explained", "Extra", "explain"]
 
 #: Probability of equal slopes below which films differ: it is asked of every number and column.
 DIFFER = 0.01
@@ -168,30 +168,3 @@ def _jumps(
         (value**2 - jump_penalty(order[extra.film].size, sample.films), extra)
         for value, extra in zip(t, tried, strict=True)
     ]
-
-
-#: Runs between two changes, at least: fewer are outliers, not a level.
-RUNS_MIN = 3
-#: With a penalty of ``2 ln n + 5`` a series of 8 to 500 independent runs without a change has one
-#: with a probability of at most 1 % (``bench_trends`` measures it).
-_PENALTY = 5.0
-
-
-def jump_penalty(runs: int, series: int) -> float:
-    """Return the chi-square that a jump in one of so many ``series`` of ``runs`` must gain."""
-    return 2.0 * math.log(max(runs, 2)) + _PENALTY + 2.0 * math.log(max(series, 1))
-
-
-def find_jumps(values: np.ndarray, penalty: float) -> list[int]:
-    """Return the places before which the level of ``values`` (n,) jumps, in deviations.
-
-    The levels minimise the sum of squares plus a ``penalty`` for each jump (the algorithm PELT of
-    ruptures).
-    """
-    if values.size < 2 * RUNS_MIN:
-        return []
-    ruptures = import_extra("ruptures", "trends", "a search for change points")
-    search = ruptures.KernelCPD(kernel="linear", min_size=RUNS_MIN)
-    # its sums of squares lose digits where the level is far from 0
-    found = search.fit((values - values.mean())[:, None]).predict(pen=penalty)
-    return [int(end) for end in found[:-1]]

@@ -84,8 +84,8 @@ class Journal:
             raise InputError(f"{self.path} cannot be written: {in_words(error)}") from error
         except InputError as error:
             raise InputError(
-                f"the campaign in {folder} is running in another process (its journal is locked); "
-                f"dearig watch {folder} shows it"
+                f"the campaign in {folder} is running in another process (its journal is locked)",
+                command=("watch", str(folder)),
             ) from error
         try:
             self.entries = read_lines(self.path)
@@ -106,7 +106,8 @@ class Journal:
         except OSError as error:
             raise InputError(
                 f"{self.path} cannot be written: {in_words(error)}; the output is at 0 V; free "
-                f"some space, then continue the campaign with --resume"
+                f"some space, then continue the campaign",
+                option="resume",
             ) from error
         self.entries.append(entry)
         return entry

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from dearig.batch.trend_columns import Design
-    from dearig.batch.trends import Trend
+from dearig.batch.trend import Trend
+from dearig.batch.trend_columns import Design
 
 __all__ = ["Proposal", "proposals"]
 

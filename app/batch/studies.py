@@ -126,15 +126,19 @@ def _listed(path: Path) -> Iterator[Subject]:
 def with_model(options: StudyOptions, model: Path | None) -> StudyOptions:
     """Return ``options`` with the text of the model file that a validation needs."""
     if options.do not in KINDS:
-        raise InputError(f"--do {options.do} is not one of {', '.join(KINDS)}")
+        raise InputError(f"{options.do} is not one of {', '.join(KINDS)}", option="do")
     if (options.do == "validate") != (model is not None):
         raise InputError(
-            "--do validate needs --model MODEL.toml"
+            "a validation needs a model file"
             if model is None
-            else f"--model is of --do validate; --do {options.do} fits a model"
+            else f"a model file is for validate; {options.do} fits a model",
+            option=("model", "do"),
         )
     if options.own and options.do != "identify":
-        raise InputError(f"--own is of --do identify; --do {options.do} shares no parameters")
+        raise InputError(
+            f"parameters of each recording's own are for identify; {options.do} shares none",
+            option=("own", "do"),
+        )
     if model is None:
         return options
     load_model(model)  # refuses what is none

@@ -40,6 +40,9 @@ _CONFOUNDED = 0.99
 #: each is 1/sqrt(1 - 0.8^2) = 1.7 times as wide as without the other one.
 _ENTANGLED = 0.8
 
+#: Units of the time since a film's first run: label, unit, and how many are a day.
+_TIMES = (("days", "day", 1.0), ("hours", "h", 24.0), ("minutes", "min", 1440.0))
+
 
 @dataclass(frozen=True)
 class Column:
@@ -100,13 +103,23 @@ def columns_in(
     if any(row.get(_CYCLES) is not None for row in rows):
         found.append(Column("cycles", "1000 cycles", _cycles_before(rows, films, order) / 1e3))
     if np.isfinite(days).any():
-        found.append(Column("days", "day", days))
+        found.append(_time_column(days))
     settings = [n for n in dict.fromkeys(n for row in rows for n in row) if n.startswith("set ")]
     for name in settings:
         values = _numbers(rows, name)
         if np.isfinite(values).any():
             found.append(Column(name.removeprefix("set "), "", values))
     return found + _rigs(rows, films)
+
+
+def _time_column(days: np.ndarray) -> Column:
+    """Return the column of the time, in the largest unit that the runs span.
+
+    A slope per day of runs within minutes would be an extrapolation far beyond them.
+    """
+    span = float(np.nanmax(days) - np.nanmin(days))
+    unit = next((u for u in _TIMES if span * u[2] >= 1.0), _TIMES[-1])
+    return Column(unit[0], unit[1], days * unit[2])
 
 
 def _named(rows: Sequence[Mapping[str, Any]], name: str) -> Column:

@@ -77,7 +77,7 @@ def _outcome(folder: Path, queue: Queue) -> CampaignOutcome:
             reason = f"results of run {run.name} are computed"
     elif not status:
         status = "killed"
-        reason = "the program ended without a word; continue with dearig campaign --resume"
+        reason = "the program ended without a word; continue the campaign"
     return CampaignOutcome(queue.name, folder, queue, status, reason)
 
 

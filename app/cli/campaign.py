@@ -130,6 +130,7 @@ def campaign(
     from dearig.cli.terminal import campaign_runs
     from dearig.config.campaignfile import load_campaign
     from dearig.config.modelfile import load_actuator
+    from dearig.config.notify import notify_sentence
     from dearig.report.pages.campaign import (
         campaign_json,
         forecast_json,
@@ -156,6 +157,10 @@ def campaign(
     )  # fmt: skip
     with working(json) as (console, progress):
         announce_rig(console, rig, settings, provenance[SOURCE])
+        notify = notify_from(notify_command, notify_webhook, notify_on, loaded.notify).checked()
+        if said := notify_sentence(notify):
+            # a plan may be another person's: what it starts is said before anything is played
+            print_line(console, f"{loaded.source}: {said}")
 
         def finish(outcome: CampaignOutcome) -> None:
             """Write and show what was done."""
@@ -167,7 +172,7 @@ def campaign(
         play_campaign(
             loaded, rig, settings, out, options, Arming(operator, runs, hours, acknowledge),
             resume=resume, ended=finish, progress=progress,
-            notify=notify_from(notify_command, notify_webhook, notify_on, loaded.notify),
+            notify=notify,
         )  # fmt: skip
 
 

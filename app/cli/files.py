@@ -23,6 +23,7 @@ from dearig.cli.output import (
     optional,
     print_line,
     print_lines,
+    with_hints,
     working,
     write_result,
 )
@@ -260,7 +261,7 @@ def _verify(path: Path, json: str | None) -> None:
     for what in found.checked:
         print_line(console, f"checked: {what}")
     for note in found.notes:
-        print_line(console, f"note: {note}", style="yellow")
+        print_line(console, f"note: {with_hints(note)}", style="yellow")
     for fault in found.faults:
         print_line(console, f"WRONG: {fault}", style="red")
     print_line(

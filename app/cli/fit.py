@@ -360,7 +360,8 @@ def diagnose(
 def _raise_early_end(outcome: DiagnoseOutcome) -> None:
     """Raise the error that ended the runs or the search early, if one did."""
     if outcome.ended is not None and not isinstance(outcome.ended, Interrupted):
-        raise type(outcome.ended)(f"{outcome.ended}; the results found before that were kept")
+        ended = outcome.ended
+        raise type(ended)(f"{ended}; the results found before that were kept") from ended
     if outcome.finding.interrupted:
         raise Interrupted("interrupted: the results found before that were kept")
 

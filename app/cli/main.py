@@ -35,8 +35,8 @@ from dearig.cli.last_words import (
     silence_libraries,
 )
 from dearig.cli.lost_interrupt import note_lost
-from dearig.cli.options import without_secrets
-from dearig.cli.output import version
+from dearig.cli.output import version, with_hints
+from dearig.command_line import without_secrets
 from dearig.errors import DearigError, DiskFault, InputError, Interrupted
 from dearig.printable import MESSAGE_MAX, PrintableStream, printable
 
@@ -208,7 +208,7 @@ def _run(written: log_file.LogFile) -> int:
         sys.stdout.flush()
     except DearigError as error:
         ignore_interrupts()
-        _say(str(error))
+        _say(with_hints(error))
         return error.exit_code
     except TyperException as error:
         _say(_usage(error))
@@ -231,6 +231,10 @@ def _run(written: log_file.LogFile) -> int:
     return DiskFault.exit_code
 
 
+#: Words of the system's loader of libraries, and of Python's threads, without memory.
+_NO_ROOM = re.compile(
+    r"failed to map segment|cannot allocate memory|can't start new thread", re.IGNORECASE
+)
 #: Errors of a system whose disk is full, over its quota or broken.
 _DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
@@ -241,7 +245,7 @@ def _exhausted(error: Exception) -> str:
     Errors of a disk reach this only from standard output and from temporary files: what writes
     results has a sentence of its own.
     """
-    without_memory = _nameless(error) or _misread(error) or _unallocated(error)
+    without_memory = _nameless(error) or _misread(error) or _unallocated(error) or _unloaded(error)
     if isinstance(error, MemoryError) or without_memory:
         return (
             "the computer has no memory left; close other programs, or give this command less at a "
@@ -267,6 +271,19 @@ def _unallocated(error: Exception) -> bool:
     """Return True if HDF5 had no memory: it says so in the words of another error."""
     said = str(error)
     return "unable to allocate" in said or "memory allocation failed" in said
+
+
+def _unloaded(error: BaseException) -> bool:
+    """Return True if a library or a thread had no room in the memory: a library may wrap this."""
+    seen: list[BaseException] = []
+    while error not in seen:
+        if isinstance(error, OSError) and error.errno == errno.ENOMEM:
+            return True
+        if isinstance(error, ImportError | OSError | RuntimeError) and _NO_ROOM.search(str(error)):
+            return True
+        seen.append(error)
+        error = error.__cause__ or error.__context__ or error
+    return False
 
 
 def _misread(error: Exception) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 import typer
 from typer.core import TyperCommand
 
+from dearig.command_line import WEBHOOK_OPTION
 from dearig.errors import InputError
 from dearig.model.spring_names import SPRINGS
 
@@ -48,7 +48,6 @@ __all__ = [
     "SpringKind",
     "Validation",
     "notify_from",
-    "without_secrets",
 ]
 
 
@@ -169,7 +168,6 @@ Operator = Annotated[str, typer.Option(help="Name of the operator, kept in the r
 
 # ---------------------------------------------------------------- notifications
 
-_WEBHOOK = "--notify-webhook"
 NotifyCommand = Annotated[
     str | None,
     typer.Option(
@@ -183,7 +181,7 @@ NotifyCommand = Annotated[
 NotifyWebhook = Annotated[
     str | None,
     typer.Option(
-        _WEBHOOK,
+        WEBHOOK_OPTION,
         metavar="ADDRESS",
         help="Send JSON to this address when a run has ended; env:NAME takes it from a variable.",
         show_default="that of the plan, if there is one",
@@ -228,18 +226,6 @@ def _words(command: str) -> tuple[str, ...]:
     if os.name == "nt":
         words = [w[1:-1] if len(w) > 1 and w[0] == w[-1] == '"' else w for w in words]
     return tuple(words)
-
-
-def without_secrets(arguments: Sequence[str]) -> list[str]:
-    """Return the ``arguments`` of a command as they may be logged: without a webhook's address."""
-    shown: list[str] = []
-    for argument in arguments:
-        if shown and shown[-1] == _WEBHOOK:
-            argument = "..."
-        elif argument.startswith(f"{_WEBHOOK}="):
-            argument = f"{_WEBHOOK}=..."
-        shown.append(argument)
-    return shown
 
 
 # ---------------------------------------------------------------- output

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dearig.errors import InputError
+from dearig.errors import Hints, InputError, hints_of
 from dearig.printable import MESSAGE_MAX, printable
 
 if TYPE_CHECKING:
@@ -23,10 +24,12 @@ __all__ = [
     "check_files",
     "console_for",
     "open_recordings",
+    "option_name",
     "optional",
     "print_line",
     "print_lines",
     "version",
+    "with_hints",
     "working",
     "write_result",
 ]
@@ -82,6 +85,37 @@ def console_for(json: str | None = None) -> Console:
     return PrintableConsole(stderr=json == "-")
 
 
+#: What is added to a text about these options, in place of their names in brackets.
+_SUFFIXES = {
+    "force": ", or use --force",
+    "skip_bad_rows": "; --skip-bad-rows leaves such rows out",
+}
+
+
+def with_hints(text: str | BaseException) -> str:
+    """Return a text, or what an error says, with the options and commands that it is about."""
+    hints = hints_of(text)
+    named = dict.fromkeys(name for hint in hints for name in _named(hint))
+    suffixes = dict.fromkeys(
+        _SUFFIXES[option] for hint in hints for option in hint.options if option in _SUFFIXES
+    )
+    brackets = f" ({', '.join(named)})" if named else ""
+    return f"{text}{brackets}{''.join(suffixes)}"
+
+
+def option_name(name: str) -> str:
+    """Return the option for a value: ``--gauge-length-mm`` for ``gauge_length_mm``."""
+    return f"--{name.replace('_', '-')}"
+
+
+def _named(hint: Hints) -> Iterator[str]:
+    options = [option_name(name) for name in hint.options if name not in _SUFFIXES]
+    if hint.command:
+        yield " ".join([shlex.join(["dearig", *hint.command]), *options])
+    else:
+        yield from options
+
+
 def print_line(console: Console, text: str, style: str | None = None) -> None:
     r"""Print ``text`` as one line, which is not wrapped: an end of line in it shows as ``\n``."""
     print_lines(console, [text], style)
@@ -102,10 +136,10 @@ def open_recordings(
     The warning comes before they are used as they are.
     """
     from dearig.analysis.readings.early_ends import early_end_warnings
-    from dearig.analysis.readings.opening import open_all
+    from dearig.recording.reading.reader import open_recording
 
-    fitted, others = open_all(train), open_all(validation)
-    found = early_end_warnings([*fitted, *others]) if ended_early == "keep" else ()
+    opened = {path: open_recording(path) for path in (*train, *validation)}
+    found = early_end_warnings([*opened.values()]) if ended_early == "keep" else ()
     if found:
         print_lines(console, [f"Warning: {said}" for said in found], "yellow")
         print_line(
@@ -113,7 +147,7 @@ def open_recordings(
             "Use --ended-early cut to leave out such an end, or --ended-early leave-out to leave "
             "out the recording.",
         )
-    return fitted, others
+    return [opened[path] for path in train], [opened[path] for path in validation]
 
 
 @contextmanager

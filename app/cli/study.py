@@ -18,7 +18,7 @@ from dearig.cli.options import (
     SpringKind,
 )
 from dearig.cli.output import check_files, print_line, working, write_result
-from dearig.errors import Interrupted
+from dearig.errors import InputError, Interrupted
 
 __all__ = ["commands"]
 
@@ -122,3 +122,8 @@ def study(
     if table.parquet is not None:
         print_line(console, f"Parquet: {table.parquet}")
     write_result(study_table_json(table), json)
+    if table.rows and len(table.failed) == len(table.rows):
+        raise InputError(
+            f"none of the {len(table.rows)} recordings has a result, the first one because "
+            f"{table.failed[0].get('reason', 'it failed')}; {table.table} has the reasons of all"
+        )

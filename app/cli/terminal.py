@@ -118,12 +118,17 @@ def trend_tables(trends: Trends) -> RenderableType:
     return _Fitted([*trends_texts(trends), effect_table(trends), *proposal_texts(trends)], ())
 
 
+#: States of a campaign that goes on when it is started again.
+_RESUMABLE = ("armed_runs", "armed_time", "interrupted", "killed")
+
+
 def campaign_runs(outcome: CampaignOutcome, most: int = 40) -> RenderableType:
     """Return how a campaign stands, and the ``most`` runs around the one that is played."""
     from dearig.report.pages.campaign import campaign_summary, campaign_table
 
     warnings = (outcome.queue.halted,) if outcome.queue.halted else ()
-    return _Fitted([*campaign_summary(outcome), campaign_table(outcome, most)], warnings)
+    on = ["Continue with dearig campaign --resume."] if outcome.status in _RESUMABLE else []
+    return _Fitted([*campaign_summary(outcome), *on, campaign_table(outcome, most)], warnings)
 
 
 def study_rows(table: StudyTable, most: int) -> RenderableType:

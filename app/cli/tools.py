@@ -61,7 +61,7 @@ def sequence_file(
     """Write a sequence file with every kind of segment, its keys and their meaning."""
     from dearig.config.sequence_example import example
 
-    _write_example(example(), out, force)
+    _write_example(example(), out, force, "dearig record FILE.toml --rig sim --out run.h5")
     print_line(console_for(), f"{out}: edit it, then run it with dearig record {out} --out FILE.h5")
 
 
@@ -73,7 +73,8 @@ def target_file(
     """Write a target file: a displacement that the film should follow."""
     from dearig.config.targetfile import EXAMPLE
 
-    _write_example(EXAMPLE, out, force)
+    use = "dearig track TARGET.toml --model MODEL.toml --rig sim --out DIR"
+    _write_example(EXAMPLE, out, force, use)
     print_line(
         console_for(),
         f"{out}: edit it, then run dearig track {out} --model MODEL.toml --out DIR",
@@ -88,20 +89,25 @@ def campaign_file(
     """Write a plan file of a campaign, with every key and its meaning."""
     from dearig.config.campaignfile import EXAMPLE
 
-    _write_example(EXAMPLE, out, force)
+    use = "dearig campaign FILE.toml --rig sim --out DIR"
+    check = f"{use} --check    (says how long it takes; plays nothing)"
+    _write_example(EXAMPLE, out, force, check, use)
     print_line(
         console_for(),
         f"{out}: edit it, then see with dearig campaign {out} --out DIR --check how long it takes",
     )
 
 
-def _write_example(text: str, out: Path, force: bool) -> None:
-    """Write the ``text`` of a file to begin with to ``out``."""
+def _write_example(text: str, out: Path, force: bool, *commands: str) -> None:
+    """Write the ``text`` of a file to begin with to ``out``, with the ``commands`` that take it."""
     from dearig.recording.files import replaced_when_done
 
     check_files(force, (), out, json=None)
     with replaced_when_done(out, overwrite=force) as partial:
-        partial.write_text(text, encoding="utf-8", newline="\n")
+        first, end, rest = text.partition("\n")
+        then = ["# Edit it, then", *(f"#   {command}" for command in commands)]
+        whole = "\n".join([first, *then]) + end + rest
+        partial.write_text(whole, encoding="utf-8", newline="\n")
 
 
 @commands.command(rich_help_panel=_PANEL)

@@ -27,6 +27,7 @@ from pydantic_core import ErrorDetails
 
 from dearig.config.notify import Notify, NotifyTable
 from dearig.config.presets import PRESETS
+from dearig.config.safe_ends import SAFE_ENDS, SafeEnd
 from dearig.config.sequence_paths import clean, filled, flat, with_settings
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
@@ -54,8 +55,6 @@ TEXT_MAX = 2**27
 #: A plan that the rig of the thesis can play.
 EXAMPLE = """\
 # A campaign: many unattended runs, one after the other.
-#   dearig campaign FILE.toml --rig sim --out DIR --check    (says how long it takes; plays nothing)
-#   dearig campaign FILE.toml --rig sim --out DIR
 name = "ageing"
 sequence = "validation-b-6.0"   # a preset, or a sequence file in this folder
 repeat = 2                      # times that each setting is played
@@ -63,6 +62,7 @@ rest_s = 5.0                    # time at 0 V between two runs
 order = "random"                # or "as_written"
 seed = 1                        # of the random order
 repeat_lost = 0                 # times that a run is repeated whose recording was lost
+repeat_after = []               # or "input-overflow", "output-underflow": it counts as lost
 # names of the recordings: name, number, repeat, and any key of the sequence
 template = "{name}-{number:04d}-{segment.0.amplitudes_kV.0}kV"
 
@@ -164,6 +164,10 @@ class _File(Table):
     repeat_lost: int = Field(
         default=0, ge=0, le=10, description="times that a lost recording is repeated"
     )
+    repeat_after: list[SafeEnd] = Field(
+        default_factory=list, max_length=len(SAFE_ENDS),
+        description="ends at confirmed 0 V after which a run counts as lost and nobody has to look",
+    )  # fmt: skip
     template: str = Field(
         default="{name}-{number:04d}", min_length=1, max_length=NAME_MAX,
         description="names of the recordings",
@@ -237,6 +241,7 @@ class Campaign:
     runs: tuple[PlannedRun, ...]
     rest: float
     repeat_lost: int
+    repeat_after: tuple[SafeEnd, ...]
     identify: bool
     validate: bool
     diagnose: bool
@@ -323,6 +328,7 @@ class _Expansion:
             runs=tuple(runs),
             rest=file.rest_s,
             repeat_lost=file.repeat_lost,
+            repeat_after=tuple(file.repeat_after),
             identify=file.after.identify,
             validate=file.after.validates,
             diagnose=file.after.diagnose,

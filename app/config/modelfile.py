@@ -194,8 +194,8 @@ def load_model(path: str | Path) -> ModelFile:
                 f"or identify the model again with this one"
             )
         raise InputError(
-            f'{name} has no line format = "{FORMAT}": it is not a model file, as dearig identify '
-            f"writes them"
+            f'{name} has no line format = "{FORMAT}": it is not a model file, as a fit writes them',
+            command=("identify",),
         )
     try:
         file = _File.model_validate(data)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -13,7 +14,7 @@ from pydantic import Field
 from dearig.config.toml_input import Table
 from dearig.errors import InputError
 
-__all__ = ["EVENTS", "Notify", "NotifyTable", "redacted"]
+__all__ = ["EVENTS", "Notify", "NotifyTable", "notify_sentence", "redacted"]
 
 Event = Literal["run-ended", "tripped", "queue-stopped"]
 
@@ -55,6 +56,15 @@ class Notify:
                 )
             command = (program, *command[1:])
         return replace(self, command=command, webhook=_address(self.webhook))
+
+
+def notify_sentence(notify: Notify) -> str:
+    """Return a sentence on what ``notify`` starts and whom it tells, "" for nothing."""
+    told = [
+        *([f"starts {shlex.join(notify.command)}"] if notify.command else []),
+        *([f"posts to {redacted(notify.webhook)}"] if notify.webhook else []),
+    ]
+    return f"at {', '.join(notify.on)} this {' and '.join(told)}" if told else ""
 
 
 class NotifyTable(Table):

@@ -21,8 +21,7 @@ from dearig.model.simulation.excitation import Segment
 __all__ = ["example", "page"]
 
 _HEAD = """\
-# A sequence: the voltage that a run plays, segment after segment. Edit it, then
-#   dearig record FILE.toml --rig sim --out run.h5
+# A sequence: the voltage that a run plays, segment after segment.
 # Units stand at the end of each key. A line that begins with # is a comment: remove the # to set
 # the key; as it stands there, it has its default.
 # Each segment must start at the voltage where the one before ends, and the run ends at 0 kV.

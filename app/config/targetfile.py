@@ -32,7 +32,6 @@ _M = 1e-6  # m per V: a target is read as a sequence in which 1 kV means 1 mm
 #: A target that the rig of the thesis can follow.
 EXAMPLE = """\
 # A target: the displacement from the loaded rest state that the film should follow, in mm.
-#   dearig track TARGET.toml --model MODEL.toml --rig sim --out DIR
 # Segments are those of a sequence, with mm in place of kV. A target starts and ends at 0 mm. A film
 # returns on its own, and no voltage pushes it: the last ramp is slow.
 name = "sine about 0.4 mm"

@@ -115,7 +115,8 @@ def build(
     except OSError as error:
         raise InputError(
             f"the documents cannot be written to {folder}: {error.strerror or error}; "
-            f"name another folder with --out"
+            f"name another folder",
+            option="out",
         ) from error
     return written
 

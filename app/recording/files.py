@@ -69,7 +69,7 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
                 # replacing a device (/dev/null) would take it from the whole machine
                 raise InputError(f"{path} is not a regular file; give the name of one")
             if not overwrite:
-                raise InputError(_exists(path))
+                raise _exists(path)
             refuse_in_use(path)
         if len(os.fsencode(path.name)) > NAME_MAX:
             raise InputError(
@@ -88,8 +88,8 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
     return path
 
 
-def _exists(path: Path) -> str:
-    return f"{path} exists already; choose another name, or replace it with --force"
+def _exists(path: Path) -> InputError:
+    return InputError(f"{path} exists already; choose another name", option="force")
 
 
 def errno_of(error: Exception) -> int | None:
@@ -184,7 +184,7 @@ def _publish(partial: FileLock, path: Path, overwrite: bool) -> None:
         try:
             with lock_existing(path) as there:
                 if not overwrite:
-                    raise InputError(_exists(path))
+                    raise _exists(path)
                 keep_permissions(path, partial.path)
                 if sys.platform == "win32":
                     # an open file can be neither renamed nor replaced there

@@ -18,7 +18,7 @@ def result_folder(out: Path, overwrite: bool) -> Path:
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; give a folder for the results")
     if out.is_dir() and any(out.iterdir()) and not overwrite:
-        raise InputError(f"{out} is not empty; give another folder with --out, or --force")
+        raise InputError(f"{out} is not empty; give another folder", option=("out", "force"))
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

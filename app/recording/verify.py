@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from dearig.errors import InputError
+from dearig.errors import InputError, Note
 from dearig.input_file import why_no_file
 from dearig.recording.content.checksums import wrong_blocks
 from dearig.recording.content.flushes import flush_notes
@@ -42,6 +42,7 @@ _TIMING = ("skew_s", "delay_s", "delay_error_s")
 _REST = ("rest_reading", "rest_samples")
 #: Faults of one kind that are listed one by one, at most.
 LISTED = 5
+_RECOVER = ("recover",)  # the command for it
 
 
 @dataclass
@@ -95,10 +96,15 @@ def _look(path: Path) -> Verification:
 def _state(found: Verification, recording: Recording) -> None:
     if whole_journal(found.path) is not None:
         found.notes.append(
-            "its last changes are in a journal beside it; dearig recover applies them"
+            Note(
+                "its last changes are in a journal beside it; recover it to apply them",
+                command=_RECOVER,
+            )
         )
     elif consistency_flags(found.path):
-        found.notes.append("it was killed, or is being written; dearig recover repairs it")
+        found.notes.append(
+            Note("it was killed, or is being written; recover it to repair it", command=_RECOVER)
+        )
     if not recording.complete:
         found.notes.append(f"the run is incomplete: {recording.outcome}")
     faults = [e for e in recording.events if e.level == "fault"]
@@ -487,6 +493,6 @@ class _Check:
             for name, row in plot.items():
                 if name == "time" or row.shape != plot["time"].shape:
                     continue
-                scales = row.dims[0].values()
-                if [scale.name for scale in scales] != [plot["time"].name]:
+                scales = list(row.dims[0].values())
+                if scales != [plot["time"]]:
                     self.fault(f"the dimension scale of {row.name} is not time")

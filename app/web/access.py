@@ -130,5 +130,5 @@ class Guard:
 
 def _without_token() -> Response:
     return PlainTextResponse(
-        "This page needs its token: open the address that dearig watch has printed.", 401
+        "This page needs its token: open the address that was printed when it was started.", 401
     )

@@ -22,7 +22,7 @@ __all__ = ["WatchServer", "serve_watch", "token_from"]
 
 #: Characters of a token that a person made, at least and at most.
 TOKEN_MIN, TOKEN_MAX = 16, 200
-_PURPOSE = "the web page of dearig watch"
+_PURPOSE = "the web page that shows a run"
 
 
 def token_from(path: Path) -> str:
@@ -53,6 +53,7 @@ class WatchServer:
         from dearig.web.access import is_loopback
         from dearig.web.app import watch_app
         from dearig.web.feed import Feed
+        from dearig.web.patience import PatientProtocol
         from dearig.web.state import look
 
         self._socket = _listen(host, port)
@@ -65,7 +66,8 @@ class WatchServer:
             watch_app(feed, host, self.port, token),
             # the log would have the token, and a page that was opened is no news
             log_config=None, access_log=False, log_level="error", server_header=False,
-            ws="none", lifespan="off", limit_concurrency=200, timeout_graceful_shutdown=3,
+            http=PatientProtocol, ws="none", lifespan="off", limit_concurrency=200,
+            timeout_graceful_shutdown=3,
         )  # fmt: skip
         self._server: Server = uvicorn.Server(config)
         name = host
@@ -113,5 +115,6 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         raise InputError(
             f"the page cannot be shown at {host}, port {port}: {in_words(error)}; give another "
-            f"--port, or 0 for a free one"
+            f"port, or 0 for a free one",
+            option="port",
         ) from error

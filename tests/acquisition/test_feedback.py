@@ -115,7 +115,7 @@ def test_the_recording_says_what_was_held_and_how(run) -> None:
     assert result.feedback.sentence in said
     assert said[0].startswith("feedback: 0.5 mm are held, correction ")
     assert f"{len(seen.answers)} answers, each 0.6 s after its readings" in said[-1]
-    with pytest.raises(InputError, match="use dearig hold again"):
+    with pytest.raises(InputError, match="hold the displacement again"):
         original_of(result.path)
 
 

@@ -54,7 +54,7 @@ def test_a_run_of_a_model_file_needs_it_again(tmp_path: Path) -> None:
     assert dearig(*record).code == 0
     refused = dearig("record", "--like", first, "--out", again)
     assert refused.code == 2
-    assert "give the model file with --model" in refused.err
+    assert "give the model file too (--model)" in refused.err
     done("record", "--like", first, "--model", model, "--out", again)
     assert same(first, again)
 
@@ -110,7 +110,7 @@ def test_on_a_card_only_the_sequence_of_a_recording_is_repeated(tmp_path: Path, 
         answer = dearig("record", "--like", run, "--rig", address, *asked, "--out", out)
         peaks = [abs(change.wire) for change in card.device.history()]
     if given == "none":
-        refused(answer, "only the sequence of", "give the rig's own file with --rig-file")
+        refused(answer, "only the sequence of", "give the rig's own file (--rig-file)")
     elif given == "lower-limit":
         refused(answer, "limits of the rig file")
     if given != "rig-file":

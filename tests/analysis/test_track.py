@@ -147,7 +147,8 @@ def test_what_cannot_be_reached_is_refused_before_anything_is_written(tmp_path):
     with pytest.raises(InputError) as refused:
         followed(folder, nearest=False)
     assert CAUSES["zero"] in str(refused.value)
-    assert "--nearest" in str(refused.value)
+    assert "follow the nearest feasible one" in str(refused.value)
+    assert refused.value.options == ("nearest",)
     assert not folder.exists()
 
 

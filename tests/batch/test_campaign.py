@@ -17,13 +17,16 @@ from dearig.batch.forecast import foresee, survey
 from dearig.batch.journal import JOURNAL, REQUESTS
 from dearig.batch.queue import Queue
 from dearig.batch.watching import seen
+from dearig.cli.output import with_hints
 from dearig.config.modelfile import save_model
+from dearig.drivers.errors import RigError
 from dearig.errors import DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator
+from dearig.output_state import OutputState
 from dearig.report.pages.campaign import campaign_table
 from tests.tools.command import LOBE
-from tests.tools.played import PLAN, RIG_FILE, UNKNOWN, Bench, Killed
+from tests.tools.played import CONFIRMED, PLAN, RIG_FILE, UNKNOWN, Bench, Killed
 
 NAMES = ["three-0001", "three-0002", "three-0003"]
 LOOKED = Arming("Ada", acknowledged="0 V at the amplifier")
@@ -39,7 +42,7 @@ def test_every_run_is_played_once_in_order(bench: Bench) -> None:
     assert list(bench.played.items()) == [(name, 1) for name in NAMES]
     assert len(set(bench.seeds.values())) == 3
     assert states(bench) == ["done"] * 3
-    with pytest.raises(InputError, match="with 3 of 3 runs done; continue it with --resume"):
+    with pytest.raises(InputError, match="with 3 of 3 runs done; continue it, or"):
         bench.play()
 
 
@@ -110,6 +113,56 @@ def test_a_lost_recording_is_repeated_only_if_the_plan_says_so(bench: Bench) -> 
     assert (bench.out / "three-0002.h5").exists()  # what was recorded until the kill
 
 
+def fault_of_the_card(code: int | None) -> InstrumentFault:
+    error = InstrumentFault("a fault of the card; the rig was made safe")
+    error.__cause__ = RigError("a fault", code)
+    return error
+
+
+BY_GUARDIAN = replace(CONFIRMED, by_guardian=True)
+OVERFLOW, UNDERFLOW = -200279, -200290
+
+
+@pytest.mark.parametrize(
+    ("named", "code", "state", "goes_on"),
+    [
+        ('["input-overflow"]', OVERFLOW, CONFIRMED, True),
+        ('["input-overflow", "output-underflow"]', UNDERFLOW, CONFIRMED, True),
+        ("[]", OVERFLOW, CONFIRMED, False),
+        ('["output-underflow"]', OVERFLOW, CONFIRMED, False),
+        ('["input-overflow"]', OVERFLOW, UNKNOWN, False),
+        ('["input-overflow"]', OVERFLOW, BY_GUARDIAN, False),
+        ('["input-overflow"]', None, CONFIRMED, False),
+    ],
+)
+def test_only_named_ends_at_confirmed_zero_are_repeated(
+    bench: Bench, named: str, code: int | None, state: OutputState, goes_on: bool
+) -> None:
+    bench.fail("three-0002", fault_of_the_card(code), state)
+    plan = PLAN + f"repeat_lost = 1\nrepeat_after = {named}\n"
+    if goes_on:
+        assert bench.play(plan).status == "complete"
+        assert states(bench) == ["done"] * 3
+        assert bench.played["three-0002-attempt-2"] == 1
+        return
+    with pytest.raises(InstrumentFault):
+        bench.play(plan)
+    with pytest.raises(InputError, match="the campaign is halted"):
+        bench.play(plan, resume=True)
+    assert bench.played["three-0002-attempt-2"] == 0
+
+
+def test_an_end_that_comes_again_halts_after_the_allowed_repeats(bench: Bench) -> None:
+    bench.fail("three-0002", fault_of_the_card(OVERFLOW))
+    bench.fail("three-0002-attempt-2", fault_of_the_card(OVERFLOW))
+    plan = PLAN + 'repeat_lost = 1\nrepeat_after = ["input-overflow"]\n'
+    with pytest.raises(InstrumentFault):
+        bench.play(plan)
+    assert bench.played["three-0002-attempt-3"] == 0
+    with pytest.raises(InputError, match="the campaign is halted: run three-0002"):
+        bench.play(plan, resume=True)
+
+
 @pytest.mark.parametrize("error", [SafetyStop("arc"), InstrumentFault("no card")])
 def test_an_interlock_and_a_fault_halt_until_a_person_has_looked(bench: Bench, error) -> None:
     bench.fail("three-0001", error)
@@ -118,7 +171,7 @@ def test_an_interlock_and_a_fault_halt_until_a_person_has_looked(bench: Bench, e
     plan = PLAN + "repeat_lost = 3\n"
     with pytest.raises(InputError, match="the campaign is halted: run three-0001"):
         bench.play(plan, resume=True)
-    with pytest.raises(InputError, match="needs --operator"):
+    with pytest.raises(InputError, match="needs the name of who looked"):
         bench.play(plan, Arming(acknowledged="looked"), resume=True)
     assert bench.played.total() == 1
     assert bench.play(plan, LOOKED, resume=True).status == "complete"
@@ -240,7 +293,7 @@ def test_a_survey_says_of_every_run_why_it_is_refused(bench: Bench) -> None:
 def test_a_real_rig_is_armed_by_a_person_for_runs_and_hours(bench: Bench) -> None:
     bench.simulated = False
     for arming in (Arming(), Arming("Ada"), Arming("Ada", runs=2), Arming(runs=2, hours=1.0)):
-        with pytest.raises(InputError, match="--operator NAME, --runs N and --hours H"):
+        with pytest.raises(InputError, match="say who arms it, for how many runs"):
             bench.continued(arming=arming)
     assert bench.play(arming=Arming("Ada", 2, 1.0)).status == "armed_runs"
     assert states(bench) == ["done", "done", "waiting"]
@@ -430,8 +483,11 @@ def test_the_gate_checks_a_run_with_the_film_s_present_model(
     )
     computed(monkeypatch, model="../soft.toml")
     plan = PLAN + "[after]\nidentify = true\n"
-    with pytest.raises(InputError, match=r"with the film's present model .*--skip three-0002"):
+    with pytest.raises(
+        InputError, match=r"with the film's present model .* three-0002 out"
+    ) as told:
         bench.play(plan)
+    assert with_hints(told.value).endswith(f" (dearig campaign-queue {bench.out} --skip)")
     assert bench.played.total() == 1
     assert states(bench) == ["done", "waiting", "waiting"]
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from dearig.batch.notify import Notifier, await_notifications
-from dearig.cli.options import notify_from, without_secrets
+from dearig.cli.options import notify_from
+from dearig.command_line import without_secrets
 from dearig.config.notify import Notify
 from dearig.errors import InputError, InstrumentFault, SafetyStop
 from tests.tools.command import LOBE, SLOW_RIG, dearig, done, refused, write
@@ -253,3 +254,13 @@ def test_the_command_record_tells_of_its_run(tmp_path: Path, told: Told) -> None
     # what was refused has not ended
     refused(dearig(*given, "--notify-command", command), "exists")
     assert len(told.all) == 1
+
+
+def test_what_a_plan_starts_is_said_before_it_is_played(tmp_path: Path, told: Told) -> None:
+    write(tmp_path / "lobe.toml", LOBE)
+    text = f'{PLAN}[notify]\ncommand = {json.dumps(told.command)}\non = ["queue-stopped"]\n'
+    plan, rig = write(tmp_path / "plan.toml", text), write(tmp_path / "rig.toml", SLOW_RIG)
+    answer = done("campaign", plan, "--rig-file", rig, "--out", tmp_path / "out")
+    said = answer.out.splitlines()[0]
+    assert "at queue-stopped this starts " in said
+    assert told.command[-1] in said

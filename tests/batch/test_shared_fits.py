@@ -88,7 +88,7 @@ def test_recordings_are_fitted_with_those_of_their_film_and_computed_once(
 
 
 def test_other_options_of_the_fit_do_not_share_parameters(shelf: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="--own is of --do identify"):
+    with pytest.raises(InputError, match="are for identify; diagnose shares none"):
         with_model(StudyOptions("diagnose", own=("mu_0",)), None)
 
 

@@ -228,3 +228,16 @@ def test_the_command_from_recordings_to_its_table(shelf: Path, tmp_path: Path) -
     assert (found.json["recordings"], found.json["ok"], found.json["failed"]) == (3, 2, 1)
     assert {"study.csv", "cache"} <= names(out)
     assert json.loads(next((out / "cache").iterdir()).read_text("utf-8"))["row"]["state"] == "ok"
+
+
+def test_a_study_without_any_result_is_no_success(tmp_path: Path) -> None:
+    (tmp_path / "recordings").mkdir()
+    for name in ("a.h5", "b.h5"):
+        (tmp_path / "recordings" / name).write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    out = tmp_path / "study"
+    answer = dearig(
+        "study", tmp_path / "recordings", "--do", "identify", "--out", out, "--workers", "1"
+    )
+    assert answer.code == 2
+    assert "none of the 2 recordings has a result" in answer.err
+    assert (out / "study.csv").exists()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dearig.batch.film_effects import find_jumps, jump_penalty
+from dearig.batch.changes import find_jumps, jump_penalty
 from dearig.batch.mixed_model import Sample, fit_linear
 from dearig.batch.table_file import read_table, write_csv, write_parquet
 from dearig.batch.trends import Trends, find_trends
@@ -18,7 +19,6 @@ from tests.tools.command import dearig, done, refused
 from tests.tools.made_campaign import TRUTH, made_rows
 
 pytest.importorskip("statsmodels", reason='takes the extra "trends"')
-pytest.importorskip("ruptures", reason='takes the extra "trends"')
 
 SOURCE = Path("study.csv")
 STORY = {"own": {"F05": 0.03}, "jump": ("F07", 6, -0.12)}
@@ -68,12 +68,30 @@ def test_simultaneous_intervals_are_those_of_sidak(story: Trends) -> None:
             assert math.isclose(wide.mean(), single.mean())
 
 
+@pytest.mark.parametrize(
+    ("apart", "label", "unit"),
+    [("day", "days", "day"), ("hour", "hours", "h"), ("minute", "minutes", "min")],
+)
+def test_slopes_over_time_are_per_a_unit_that_the_runs_span(
+    apart: str, label: str, unit: str
+) -> None:
+    rows = made_rows(3, films=3, runs=6)
+    for i, row in enumerate(rows):
+        step = timedelta(**{f"{apart}s": i})
+        row["started"], row["cycles"] = (datetime(2026, 11, 2, tzinfo=UTC) + step).isoformat(), None
+        row["mu_0_kPa"] = 40.0 * 0.99**i  # a percent less each time
+    (trend,) = trends_of(rows, numbers=["mu_0_kPa"]).trends
+    (effect,) = [e for e in trend.effects if e.column.label == label]
+    assert effect.column.unit == unit
+    assert effect.slope == pytest.approx(-1.0, abs=0.2)  # % per unit, not -100 % per day
+
+
 def test_slopes_per_day_of_runs_within_seconds_are_numbers() -> None:
     rows = made_rows(3, films=3, runs=6)
     for i, row in enumerate(rows):
         row["started"], row["cycles"] = f"2026-11-02T08:00:{i:02d}+00:00", None
     found = trends_of(rows, numbers=["mu_0_kPa"])
-    assert "days" in {effect.column.label for effect in found.trends[0].effects}
+    assert "minutes" in {effect.column.label for effect in found.trends[0].effects}
     for row in found.effect_rows():
         assert math.isfinite(row["high95_simultaneous"])
 
@@ -155,7 +173,7 @@ def test_columns_that_show_nothing_are_what_to_vary_next() -> None:
         # the same to the last digits: humidity and the setting cannot be told apart
         row["set gain"] = 2.0 * row["relative_humidity_percent"]
     found = trends_of(rows, numbers=["permittivity"])
-    assert [e.column.label for e in found.trends[0].effects] == ["humidity", "days"]
+    assert [e.column.label for e in found.trends[0].effects] == ["humidity", "hours"]
     told = {(p.kind, p.columns[0]) for p in found.proposals}
     assert {("vary", "temperature"), ("separate", "gain")} <= told
     assert any("humidity" in s and "gain" in s for s in found.left_out)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.batch.film_effects import find_jumps, jump_penalty
+from dearig.batch.changes import find_jumps, jump_penalty
 from dearig.batch.fits import parameter_columns
 from dearig.batch.numbers import parameter_of
 from dearig.batch.trends import find_trends

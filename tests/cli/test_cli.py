@@ -505,7 +505,7 @@ def test_demo_does_the_main_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert load_model(folder / "improved.toml").model.effects
     again = dearig("demo", "--out", folder)
     assert again.code == 2
-    assert "is not empty; give another folder with --out, or --force" in again.err
+    assert "is not empty; give another folder (--out), or use --force" in again.err
 
 
 # ---------------------------------------------------------------- ctrl-C for real

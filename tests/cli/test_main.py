@@ -64,6 +64,13 @@ def test_an_unexpected_error_is_one_sentence_and_its_traceback_is_in_the_log(
     assert text.splitlines()[-1].endswith("ended with exit code 1")
 
 
+def wrapped(error: Exception) -> Exception:
+    """Return the error of a library that had ``error`` and says something else of it."""
+    other = OSError("Could not find or load the library")
+    other.__context__ = error
+    return other
+
+
 @pytest.mark.parametrize(
     ("lack", "said"),
     [
@@ -73,6 +80,10 @@ def test_an_unexpected_error_is_one_sentence_and_its_traceback_is_in_the_log(
         (SystemError("error return without exception set"), "no memory left"),
         (SyntaxError("invalid syntax", (__file__, 1, 1, "", 1, 1)), "no memory left"),
         (SyntaxError("invalid syntax", ("<string>", 4, 1, "", 4, 1)), "no memory left"),
+        (ImportError("libx.so: failed to map segment from shared object"), "no memory left"),
+        (RuntimeError("can't start new thread"), "no memory left"),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), "no memory left"),
+        (wrapped(ImportError("libx.so: failed to map segment")), "no memory left"),
         (OSError(errno.ENOSPC, "full"), "free some space"),
     ],
     ids=[
@@ -82,6 +93,10 @@ def test_an_unexpected_error_is_one_sentence_and_its_traceback_is_in_the_log(
         "memory for an error",
         "memory for a parser",
         "made code",
+        "address space",
+        "thread",
+        "memory for a file",
+        "wrapped by a library",
         "disk",
     ],
 )

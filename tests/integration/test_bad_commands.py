@@ -23,7 +23,10 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "no campaign to ask": ("campaign-queue no --pause", ["no has no campaign"]),
     "nothing to watch": ("watch no.h5", ["no.h5 is not there"]),
     "nothing to study": ("study {s}/lobe.toml --do identify --out o", ["lobe.toml is not one"]),
-    "a study without its model": ("study {s} --do validate --out o", ["needs --model MODEL.toml"]),
+    "a study without its model": (
+        "study {s} --do validate --out o",
+        ["needs a model file", "--model"],
+    ),
     "a study on nothing": ("study {s}/run.h5 --do identify --on x --out o", ["write local, or"]),
     # rigs and outputs
     "unknown rig": (

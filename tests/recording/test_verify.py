@@ -162,7 +162,7 @@ def test_what_a_killed_run_cannot_claim_is_noted(tmp_path: Path) -> None:
     assert found.faults == []
     assert found.notes == [
         "the last 4464 samples have no checksum yet: the run was killed before it was written",
-        "it was killed, or is being written; dearig recover repairs it",
+        "it was killed, or is being written; recover it to repair it",
         "the run is incomplete: killed, or still running",
         "fault at sample 70000 (70 s): amplifier tripped",
     ]

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QMenu,
     QProgressBar,
+    QScrollArea,
     QTabBar,
     QTableView,
     QToolButton,
@@ -182,6 +183,12 @@ def cut_off(window: QWidget) -> list[str]:
         elif isinstance(widget, QComboBox):
             room = widget.width() - _ARROW
             bad, text = _wide(widget, widget.currentText()) > room, widget.currentText()
+        elif isinstance(widget, QScrollArea) and widget.widget() is not None:
+            off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+            bad = widget.horizontalScrollBarPolicy() == off and (
+                widget.widget().width() > widget.viewport().width()
+            )
+            text = widget.accessibleName() or "what cannot be scrolled to"
         elif isinstance(widget, QTableView) and widget.horizontalHeader().isVisible():
             text = _cut_head(widget)
             bad = bool(text)

@@ -86,7 +86,7 @@ def base_model(
     films = {r.film for r in recordings if r.film is not None}
     loads = {r.load for r in recordings if r.load is not None}
     if len(films) > 1 or len(loads) > 1:
-        raise InputError(_differing(recordings))
+        raise InputError(_differing(recordings), option="rig_file")
     default = rig_file or RigFile()
     film = films.pop() if films and rig_file is None else default.as_film()
     load = loads.pop() if loads and rig_file is None else default.as_load()
@@ -116,7 +116,7 @@ def assumed_by(recordings: Sequence[Recording], rig_file: RigFile | None) -> str
         return ""
     return (
         f"Assumed, because the recordings do not say it: {' and '.join(assumed)} of the thesis; "
-        f"give yours with --rig-file, or when the data are imported"
+        f"give yours in a rig file, or when the data are imported"
     )
 
 
@@ -156,7 +156,7 @@ def _differing(recordings: Sequence[Recording]) -> str:
                 return (
                     f"{first.path} and {other.path} are of different {what} "
                     f"({_apart(one, two)}, in SI units); fit them one by "
-                    f"one, or say with --rig-file what holds for all"
+                    f"one, or say in a rig file what holds for all"
                 )
     return "these recordings are of different films or loads; fit them one by one"
 

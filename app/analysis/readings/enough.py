@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dearig.analysis.readings.record import Readings
 from dearig.errors import InputError
 from dearig.recording.reading.recording import Recording
+
+if TYPE_CHECKING:
+    # it imports the filters of SciPy, which a run does without
+    from dearig.analysis.readings.record import Readings
 
 __all__ = ["check_enough", "extrapolated", "few_data", "overlap"]
 

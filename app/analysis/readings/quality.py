@@ -85,7 +85,7 @@ def driven_by(recording: Recording, drive: str) -> np.ndarray | None:
         return recording.voltage_command
     if recording.voltage_monitor is None:
         raise InputError(
-            f"{recording.path} has no voltage monitor; leave --drive out to use the command"
+            f"{recording.path} has no voltage monitor; use the commanded voltage", option="drive"
         )
     return recording.voltage_monitor
 

@@ -7,8 +7,10 @@
 /entry/title, start_time, end_time
 /entry/entry_identifier_uuid   identifies the recording, whatever its file is called
 /entry/data             NXdata: time and the physical values, and beside them NAME_counts
-                        also of the channels that the rig file declares, by their names
-/entry/instrument/*     one NXinstrument for each instrument; channels/NAME links to the counts
+                        also of the channels that the rig file declares, by their names; while a
+                        run is going on its signal is displacement_counts, and there are no axes
+/entry/instrument/*     one NXinstrument for each instrument, with its settings as an attribute;
+                        channels/NAME links to the counts
 /entry/sample           NXsample: film and load
 /entry/sequence         TOML (runs only)
 /entry/model            TOML of the live overlay (when there was one)
@@ -20,6 +22,10 @@
                         relative_humidity_percent
 /entry/pyramid/*        minima and maxima of the counts over bins (runs only)
 /entry/checksums        CRC-32 of the counts (runs only)
+/entry/event, checksum_block, checksum_channel   dimension scales of these tables, which number
+                        their rows and columns; after a run
+/entry/time             the same dataset as /entry/data/time, after a run: readers of netCDF look
+                        for the dimension of a linked row in the groups above it only
 /entry/overview         NXdata: minima and maxima of the physical values of a long run
 /entry/provenance       versions, configuration and its hash, seed, host, operator
                         of a hold also feedback (TOML)
@@ -60,6 +66,8 @@ __all__ = [
     "iso_time",
     "lay_out",
     "make_own_scale",
+    "name_dimensions",
+    "show_plot",
     "variable_attributes",
 ]
 
@@ -214,9 +222,10 @@ def attach_time(data: h5py.Group) -> None:
     it is done when a run is finished, which is also when ``time`` is written.
     """
     time = data["time"]
-    time.make_scale("time")
+    if not time.is_scale:
+        time.make_scale("time")
     for name, row in data.items():
-        if name != "time" and row.shape == time.shape:
+        if name != "time" and row.shape == time.shape and not len(row.dims[0]):
             row.dims[0].attach_scale(time)
 
 
@@ -224,9 +233,60 @@ def make_own_scale(rows: h5py.Dataset) -> None:
     """Make a table under /entry a dimension scale, so that its dimension has a name.
 
     xarray warns of nameless dimensions in every group above the one that it opens. For a table that
-    grows in SWMR mode this must be done when it is created.
+    grows in SWMR mode this must be done when it is created. ``rows`` is (n,): no reader of netCDF
+    takes a scale with more dimensions.
     """
     rows.make_scale(rows.name.rpartition("/")[2])
+
+
+def name_dimensions(entry: h5py.Group) -> None:
+    """Give the dimensions under ``entry`` names that netCDF finds; for a finished run.
+
+    SWMR mode forbids it during the run. Files of earlier versions have the checksums themselves as
+    a scale, which is taken off.
+    """
+    for table, names in NUMBERED.items():
+        rows = entry.get(table)
+        if rows is None:
+            continue
+        for attribute in ("CLASS", "NAME", "REFERENCE_LIST"):
+            if attribute in rows.attrs:
+                del rows.attrs[attribute]
+        for axis, name in enumerate(names):
+            _number(entry, rows, axis, name)
+    if "time" in entry["data"] and "time" not in entry and entry["data/time"].is_scale:
+        entry["time"] = entry["data/time"]
+
+
+def _number(entry: h5py.Group, rows: h5py.Dataset, axis: int, name: str) -> None:
+    """Give the dimension ``axis`` of ``rows`` a scale ``name`` that numbers it."""
+    if name in entry:
+        if entry[name].shape[0] == rows.shape[axis]:
+            return
+        rows.dims[axis].detach_scale(entry[name])
+        del entry[name]
+    scale = entry.create_dataset(name, data=np.arange(rows.shape[axis], dtype="<i4"))
+    scale.make_scale(name)
+    rows.dims[axis].attach_scale(scale)
+
+
+#: Scales of the dimensions of tables under /entry. The events are none themselves: xarray reads
+#: scales when it opens a file, and netCDF-C corrupts its memory when it reads texts in a row.
+NUMBERED = MappingProxyType(
+    {"checksums": ("checksum_block", "checksum_channel"), "events": ("event",)}
+)
+
+
+def show_plot(data: h5py.Group, kind: str, *, live: bool) -> None:
+    """Name what viewers plot: the physical values over time, or the counts while a run is going on.
+
+    SWMR mode forbids a change during the run.
+    """
+    data.attrs["signal"] = fixed(counts_name(SIGNALS[kind]) if live else SIGNALS[kind])
+    if live:
+        data.attrs.pop("axes", None)
+    else:
+        data.attrs["axes"] = fixed(["time"])
 
 
 def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Group:
@@ -245,6 +305,5 @@ def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Grou
     put_text(entry, IDENTIFIER, str(uuid.uuid4()))
     data = entry.create_group("data")
     data.attrs["NX_class"] = fixed("NXdata")
-    data.attrs["signal"] = fixed(SIGNALS[kind])
-    data.attrs["axes"] = fixed(["time"])
+    show_plot(data, kind, live=False)
     return entry

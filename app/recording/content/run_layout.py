@@ -31,8 +31,10 @@ def write_instruments(entry: h5py.Group, identity: RigIdentity) -> None:
         group.attrs["role"] = fixed(instrument.role)
         group.attrs["model"] = fixed(instrument.model)
         group.attrs["serial"] = fixed(instrument.serial)
-        pairs = fixed([text for pair in instrument.settings for text in pair])
-        group.create_dataset("settings", data=pairs.reshape(-1, 2))
+        # name, value, name, value; an attribute, since Octave stops reading a file at a dataset
+        # with a micro sign or a degree sign
+        if instrument.settings:
+            group.attrs["settings"] = fixed([text for pair in instrument.settings for text in pair])
 
 
 def check_channels(channels: tuple[Channel, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Text in a recording file: UTF-8 of fixed length, written and read.
+"""Text in a recording file: ASCII or UTF-8 of fixed length, written and read.
 
 Variable length is not used: HDF5 keeps such text on a heap without a checksum. A run in SWMR mode
 cannot append to the heap, and one damaged byte in it can put the library into an endless loop.
@@ -22,7 +22,9 @@ def fixed(text: str | Sequence[str]) -> np.ndarray:
     """Return ``text``, or a row of texts, as an array for an attribute or a dataset."""
     raw = _encoded(text) if isinstance(text, str) else [_encoded(t) for t in text]
     longest = len(raw) if isinstance(raw, bytes) else max(map(len, raw), default=0)
-    return np.array(raw, dtype=h5py.string_dtype("utf-8", max(longest, 1)))
+    # Octave stops reading a file at the first text that is marked as UTF-8
+    plain = all(map(bytes.isascii, [raw] if isinstance(raw, bytes) else raw))
+    return np.array(raw, dtype=h5py.string_dtype("ascii" if plain else "utf-8", max(longest, 1)))
 
 
 def put_text(group: h5py.Group, name: str, text: str) -> None:

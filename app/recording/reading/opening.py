@@ -122,7 +122,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
             if not after:
                 raise InputError(
                     f"{path} is empty: its run or its program ended before it wrote anything; "
-                    f"delete it, or replace it with --force"
+                    f"delete it, or record again",
+                    option="force",
                 )
             flags = flags_of(patched.read(SIZE) or b"")
         except OSError as error:
@@ -131,8 +132,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
             raise InputError(f"{path} is damaged: {error}") from error
         if flags is None:
             raise InputError(
-                f"{path} is not an HDF5 file, as recordings are; import data of other programs "
-                f"with dearig import"
+                f"{path} is not an HDF5 file, as recordings are; import data of other programs",
+                command=("import",),
             )
         if flags and not flags & WRITTEN_IN_ORDER:
             raise InputError(f"{path} {BEING_WRITTEN}")

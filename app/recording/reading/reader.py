@@ -299,14 +299,15 @@ class _Reader:
             if one is None or text_of(one.attrs.get("NX_class", "")) != "NXinstrument":
                 continue
             attrs = one.attrs
-            rows = dataset(one, "settings")
-            settings = () if rows is None else rows.asstr()[()]
+            rows = dataset(one, "settings")  # of versions up to 0.2
+            said = one.attrs.get("settings", ()) if rows is None else rows[()]
+            texts = [text_of(text) for text in np.ravel(said)]
             found.append(
                 Instrument(
                     role=text_of(attrs.get("role", "")),
                     model=text_of(attrs.get("model", "")),
                     serial=text_of(attrs.get("serial", "")),
-                    settings=tuple((str(name), str(value)) for name, value in settings),
+                    settings=tuple(zip(texts[::2], texts[1::2], strict=False)),
                 )
             )
         return tuple(found)

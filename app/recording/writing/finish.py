@@ -22,6 +22,8 @@ from dearig.recording.content.layout import (
     counts_name,
     create_field,
     iso_time,
+    name_dimensions,
+    show_plot,
 )
 from dearig.recording.content.modelled import keep_modelled
 from dearig.recording.content.physical import SLICE, Counts
@@ -80,6 +82,8 @@ def finish(
                     # a very long run has its physical values, and so its time, in counts only
                     if plot is not None and "time" in plot:
                         attach_time(plot)
+                show_plot(entry["data"], "actuator", live=False)
+                name_dimensions(entry)
                 if ended is not None:
                     put_text(entry, "end_time", iso_time(ended))
                 entry.attrs["samples"] = samples

@@ -10,7 +10,13 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.input_file import why_no_file
 from dearig.recording.content.journal import changed_in_place
-from dearig.recording.content.layout import EVENT_LEVELS, EVENT_TYPE, LIBVER, MESSAGE_BYTES
+from dearig.recording.content.layout import (
+    EVENT_LEVELS,
+    EVENT_TYPE,
+    LIBVER,
+    MESSAGE_BYTES,
+    name_dimensions,
+)
 from dearig.recording.content.text import clip_text
 from dearig.recording.files import in_words
 from dearig.recording.lock import lock_existing
@@ -35,7 +41,7 @@ def add_event(path: str | Path, level: str, message: str) -> None:
     recording = open_recording(path)
     try:
         if not is_finished(path):
-            raise InputError(f"{path} is not finished; finish it with dearig recover {path}")
+            raise InputError(f"{path} is not finished; recover it", command=("recover", str(path)))
         row = np.zeros(1, dtype=EVENT_TYPE)
         last, text = max(recording.samples - 1, 0), clip_text(message, MESSAGE_BYTES)
         row[0] = (last, recording.duration, level.encode(), text)
@@ -47,5 +53,6 @@ def add_event(path: str | Path, level: str, message: str) -> None:
             events = file["entry/events"]
             events.resize((events.shape[0] + 1,))
             events[-1:] = row
+            name_dimensions(file["entry"])
     except UNREADABLE as error:
         raise InputError(f"{path} cannot be written: {in_words(error)}") from error

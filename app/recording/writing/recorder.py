@@ -280,7 +280,8 @@ class Recorder:
                 self._given_up = DiskFault(
                     f"the disk of {writer.path.absolute().parent} had not taken the last "
                     f"{self._received - safe} of {self._received} samples when the operator "
-                    f"stopped waiting for it; finish the file with dearig recover {writer.path}"
+                    f"stopped waiting for it; recover the file to finish it",
+                    command=("recover", str(writer.path)),
                 )
                 raise self._given_up
 

@@ -23,7 +23,7 @@ from dearig.recording.content.layout import (
     attach_time,
     create_field,
     lay_out,
-    make_own_scale,
+    name_dimensions,
 )
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.provenance import gather, write_provenance
@@ -99,6 +99,7 @@ def save_recording(
         _write_events(entry, tuple(events), np.asarray(values["time"], dtype=np.float64))
         write_provenance(entry, noted)
         entry.create_group("instrument").attrs["NX_class"] = fixed("NXcollection")
+        name_dimensions(entry)
         entry.attrs["samples"] = size
         means = mean_conditions(None, lambda channel, _: _whole(values, channel))
         for name, value in means.items():
@@ -125,4 +126,4 @@ def _write_events(entry: h5py.Group, events: tuple[Event, ...], time_s: np.ndarr
             event.level.encode(),
             clip_text(event.message, MESSAGE_BYTES),
         )
-    make_own_scale(entry.create_dataset("events", data=rows, dtype=EVENT_TYPE))
+    entry.create_dataset("events", data=rows, dtype=EVENT_TYPE)

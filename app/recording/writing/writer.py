@@ -41,6 +41,7 @@ from dearig.recording.content.layout import (
     counts_name,
     lay_out,
     make_own_scale,
+    show_plot,
 )
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.modelled import ModelledWriter
@@ -245,8 +246,8 @@ class RecordingWriter:
             "wall_clock", shape=(0,), maxshape=(None,), chunks=(256,), dtype=WALL_CLOCK_TYPE
         )
 
-        for name in ("events", "checksums", "wall_clock"):
-            make_own_scale(entry[name])
+        make_own_scale(self._wall_clock)
+        show_plot(data, "actuator", live=True)
 
         write_instruments(entry, self._identity)
 
@@ -354,7 +355,8 @@ class RecordingWriter:
             self._written = self._flushed
             self._failure = DiskFault(
                 f"{error}; the {self._flushed} samples until then are in the file, as counts: "
-                f"free some space, then finish it with dearig recover {self._path}"
+                f"free some space, then recover it",
+                command=("recover", str(self._path)),
             )
             raise self._failure from error
 

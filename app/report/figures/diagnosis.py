@@ -10,6 +10,7 @@ import numpy as np
 
 from dearig.analysis.decimate import decimate
 from dearig.report.figures import style as base
+from dearig.report.figures.defaults import style
 from dearig.report.text.numbers import significant
 from dearig.units import SHOWN, Shown
 
@@ -45,7 +46,7 @@ def before_after_figure(before: Comparison, after: Comparison) -> Figure:
     """Draw drive, measurement, both models and both errors of one recording over time."""
     shown = SHOWN[after.kind]
     time = after.time
-    with base.style():
+    with style():
         figure = base.blank(base.WIDTH, 4.8)
         axes = figure.subplots(4, 1, sharex=True, height_ratios=(0.8, 1.7, 1.0, 1.0))
         drive, both, first, last = axes
@@ -85,7 +86,7 @@ def residual_time_figure(before: Signature, after: Signature | None, kind: str) 
     pairs = [("before", before, BEFORE)]
     if after is not None:
         pairs.append(("after", after, AFTER))
-    with base.style():
+    with style():
         figure = base.blank(base.WIDTH, 0.6 + 1.45 * len(pairs))
         axes = figure.subplots(len(pairs), 1, sharex=True, squeeze=False)[:, 0]
         for ax, (name, signature, colour) in zip(axes, pairs, strict=True):
@@ -108,7 +109,7 @@ def spectra_figure(before: Signature, after: Signature | None, kind: str) -> Fig
     """Draw the amplitude density of the residual, before and after, with the noise floor."""
     shown = SHOWN[kind]
     floor = math.sqrt(before.floor_density) * shown.error_factor
-    with base.style():
+    with style():
         figure = base.blank(base.WIDTH, 3.4)
         ax = figure.subplots()
         heights = [floor]
@@ -139,7 +140,7 @@ def dependence_figure(dependence: Dependence, kind: str) -> Figure:
     """Draw the mean residual against one quantity, for rising and for falling values."""
     shown = SHOWN[kind]
     scale = shown.error_factor
-    with base.style():
+    with style():
         figure = base.blank(0.6 * base.WIDTH, 2.5)
         ax = figure.subplots()
         error = 2.0 * dependence.error * scale
@@ -172,7 +173,7 @@ def dependence_figure(dependence: Dependence, kind: str) -> Figure:
 
 def missing_time_figure(before: MissingStress, after: MissingStress | None) -> Figure:
     """Draw the missing stress over time, before and after."""
-    with base.style():
+    with style():
         figure = base.blank(1.3 * base.WIDTH, 2.2)
         ax = figure.subplots()
         for missing, name, colour in ((before, "before", BEFORE), (after, "after", AFTER)):
@@ -201,7 +202,7 @@ def missing_figures(missing: MissingStress, kind: str) -> list[tuple[str, Figure
     loading = missing.rate >= 0.0
     drawn = []
     for name, label, values in quantities:
-        with base.style():
+        with style():
             figure = base.blank(0.6 * base.WIDTH, 2.5)
             ax = figure.subplots()
             for which, side, colour in (
@@ -224,7 +225,7 @@ def missing_figures(missing: MissingStress, kind: str) -> list[tuple[str, Figure
 
 def curve_figure(curve: Curve) -> Figure:
     """Draw the form that a general law has found."""
-    with base.style():
+    with style():
         figure = base.blank(0.6 * base.WIDTH, 2.5)
         ax = figure.subplots()
         ax.plot(curve.axis, curve.values, color=AFTER, linewidth=1.4)
@@ -243,7 +244,7 @@ def bars_figure(
     rows = np.arange(len(pairs))
     before = np.array([b.errors.rms for b, _ in pairs]) * shown.error_factor
     after = np.array([a.errors.rms for _, a in pairs]) * shown.error_factor
-    with base.style():
+    with style():
         figure = base.blank(base.WIDTH, 1.0 + 0.5 * len(pairs))
         ax = figure.subplots()
         for values, shift, name, colour in (

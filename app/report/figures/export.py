@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
-from dearig.report.figures.style import style
+from dearig.report.figures.defaults import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,7 @@ import io
 
 from matplotlib.figure import Figure
 
-from dearig.report.figures.style import style
+from dearig.report.figures.defaults import style
 
 __all__ = ["NotebookFigure"]
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
     MARK,
     MEASURED,
@@ -20,7 +21,6 @@ from dearig.report.figures.style import (
     legend,
     log_axis,
     log_ticks,
-    style,
 )
 from dearig.report.text.numbers import symbol
 from dearig.report.text.thesis import table_3

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dearig.analysis.decimate import decimate, decimate_path
+from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
     COLUMNS,
     DRIVE,
@@ -25,7 +26,6 @@ from dearig.report.figures.style import (
     few_ticks,
     legend,
     log_axis,
-    style,
 )
 from dearig.report.text.numbers import significant
 from dearig.units import SHOWN, Shown

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.analysis.residual import autocorrelation, even, spectrum
+from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
     MEASURED,
     MODEL,
@@ -20,7 +21,6 @@ from dearig.report.figures.style import (
     few_ticks,
     legend,
     log_axis,
-    style,
 )
 from dearig.report.text.numbers import significant
 from dearig.units import SHOWN

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.analysis.decimate import decimate
+from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
     COLUMNS,
     DRIVE,
@@ -16,7 +17,6 @@ from dearig.report.figures.style import (
     blank,
     few_ticks,
     legend,
-    style,
 )
 from dearig.units import SHOWN
 

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dearig.batch.trends import Trend, Trends
+from dearig.batch.trend import Trend
+from dearig.batch.trends import Trends
+from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
     ERROR,
     MEASURED,
@@ -17,7 +19,6 @@ from dearig.report.figures.style import (
     blank,
     drawable,
     few_ticks,
-    style,
 )
 from dearig.report.text.trends import number_name
 

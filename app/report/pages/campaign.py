@@ -268,7 +268,8 @@ def numbers_figure(queue: Queue, names: Sequence[str]) -> Figure:
     """Draw each number of the runs against the order of the runs, one below the other."""
     from matplotlib.ticker import MaxNLocator
 
-    from dearig.report.figures.style import WIDTH, blank, few_ticks, style
+    from dearig.report.figures.defaults import style
+    from dearig.report.figures.style import WIDTH, blank, few_ticks
 
     runs = list(enumerate(queue.listed, start=1))
     with style():

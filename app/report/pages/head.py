@@ -13,6 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dearig.command_line import without_secrets
+
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import Comparison
     from dearig.recording.reading.origin import Origin
@@ -83,7 +85,8 @@ def head_of(origins: Iterable[Origin], rows: Sequence[tuple[str, Sequence[str]]]
 
 def command_line() -> str:
     """Return the command line of this process, quoted as a shell reads it."""
-    words = [Path(sys.argv[0]).stem if sys.argv[:1] != [""] else "python", *sys.argv[1:]]
+    words = [Path(sys.argv[0]).stem if sys.argv[:1] != [""] else "python"]
+    words += without_secrets(sys.argv[1:])
     if words[0] == "__main__":
         words[0] = "dearig"
     return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dearig.report.figures.style import DRIVE, MEASURED, NOISE, WIDTH, blank, few_ticks, style
+from dearig.report.figures.defaults import style
+from dearig.report.figures.style import DRIVE, MEASURED, NOISE, WIDTH, blank, few_ticks
 from dearig.report.text.numbers import seconds, significant
 from dearig.units import readable
 

@@ -22,6 +22,7 @@ from dearig.report.figures.recordings import comparison_figure, loop_figure
 from dearig.report.figures.residual import bin_text, residual_panels
 from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.pdf import check_browser, is_pdf, write_pdf
+from dearig.report.pages.seal import POLICY, sealed
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
 from dearig.report.text.sentences import (
     describe_model,
@@ -57,8 +58,6 @@ __all__ = [
     "write_validate_report",
 ]
 
-#: A page runs no script and loads nothing, whatever is in it; its links to CSV files are data.
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 #: Sections from which on a page has a list of them.
 _CONTENTS_MIN = 4
 #: Places after separators, where a long name may be broken.
@@ -188,10 +187,10 @@ def _render(template: str, contents: dict[str, Any]) -> str:
     environment.filters["breakable"] = _breakable
     page = environment.get_template(template).render(
         contents,
-        policy=_POLICY,
+        policy=POLICY,
         contents_place=Markup(_CONTENTS_PLACE),  # noqa: S704
     )
-    return page.replace(_CONTENTS_PLACE, _contents_list(page), 1)
+    return sealed(page.replace(_CONTENTS_PLACE, _contents_list(page), 1))
 
 
 def _contents_list(page: str) -> str:

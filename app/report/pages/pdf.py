@@ -10,7 +10,9 @@ import tempfile
 from pathlib import Path
 
 from dearig.errors import InputError
+from dearig.input_file import read_input
 from dearig.printable import printable
+from dearig.report.pages.seal import check_page
 
 __all__ = ["check_browser", "is_pdf", "print_report", "write_pdf"]
 
@@ -32,8 +34,13 @@ _PLACES = (
 )
 #: Seconds that a browser may take: it needs one for a report, and some to start on a busy computer.
 _PATIENCE = 180.0
-#: Beginning of a page that this program wrote.
-_MARK = '<meta name="generator" content="dearig">'
+_LARGEST = 2**28  # bytes of a report, at most: some hundred times those of a diagnosis
+#: No page that is printed reaches a network, whatever is in it.
+_ALONE = (
+    "--proxy-server=127.0.0.1:9", "--proxy-bypass-list=<-loopback>",
+    "--host-resolver-rules=MAP * ~NOTFOUND", "--disable-background-networking", "--disable-sync",
+    "--disable-component-update", "--disable-default-apps",
+)  # fmt: skip
 
 
 def is_pdf(path: str | Path) -> bool:
@@ -65,27 +72,25 @@ def print_report(report: str | Path, out: str | Path, overwrite: bool = False) -
 
     Raises ``InputError`` for a file that is no report of this program, or that cannot be printed.
     """
-    from dearig.recording.files import check_output, in_words
+    from dearig.recording.files import check_output
 
     report = Path(report)
     out = check_output(out, overwrite, report)
     try:
-        page = report.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        words = in_words(error) if isinstance(error, OSError) else "it is no text"
-        raise InputError(f"the report {report} cannot be read: {words}") from error
-    if _MARK not in page[:2000]:
-        raise InputError(
-            f"{report} is no report of this program; give a file that --report wrote, such as "
-            f"report.html"
-        )
-    return write_pdf(page, out, overwrite)
+        page = read_input(report, "report", _LARGEST).decode("utf-8")
+    except ValueError as error:
+        raise InputError(f"the report {report} cannot be read: it is no text") from error
+    return write_pdf(page, out, overwrite, str(report))
 
 
-def write_pdf(page: str, out: Path, overwrite: bool = True) -> Path:
-    """Print ``page``, the HTML of a report, to the PDF file ``out``. Raises ``InputError``."""
+def write_pdf(page: str, out: Path, overwrite: bool = True, name: str = "the report") -> Path:
+    """Print ``page``, the HTML of a report, to the PDF file ``out``. Raises ``InputError``.
+
+    ``name`` is that of the page, for messages. A page that could run or load anything is refused.
+    """
     from dearig.recording.files import replaced_when_done
 
+    check_page(page, name)
     browser = check_browser()
     # beside the result and not in the folder for temporary files: a browser from a snap or a
     # flatpak is not allowed to see that
@@ -106,12 +111,14 @@ def write_pdf(page: str, out: Path, overwrite: bool = True) -> Path:
 def _run(browser: str, profile: str, source: Path, printed: Path) -> str:
     """Let ``browser`` print ``source`` to ``printed``; return the last line that it said."""
     command = [
-        browser, "--headless", "--disable-gpu", "--no-first-run", "--disable-extensions",
+        browser, "--headless", *_ALONE, "--disable-gpu", "--no-first-run", "--disable-extensions",
         f"--user-data-dir={profile}", "--no-pdf-header-footer", "--generate-pdf-document-outline",
         f"--print-to-pdf={printed.resolve()}", source.resolve().as_uri(),
     ]  # fmt: skip
     if sys.platform != "win32" and os.geteuid() == 0:
-        command.insert(1, "--no-sandbox")  # it refuses to start as root with one, as in containers
+        # it refuses to start as root with a sandbox, as in containers; ``check_page`` has let
+        # nothing through that could run
+        command.insert(1, "--no-sandbox")
     try:
         done = subprocess.run(  # noqa: S603  (a browser of the computer, arguments of this program)
             command, capture_output=True, check=False, timeout=_PATIENCE

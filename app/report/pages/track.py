@@ -11,6 +11,7 @@ import numpy as np
 
 from dearig.analysis.decimate import decimate
 from dearig.analysis.track_target import missed_parts
+from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
     COLUMNS,
     ERROR,
@@ -25,7 +26,6 @@ from dearig.report.figures.style import (
     few_ticks,
     legend,
     log_axis,
-    style,
 )
 from dearig.report.pages.head import head_of
 from dearig.report.pages.html import Picture, picture, prefixes, write_page

@@ -166,9 +166,7 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
             "The search was stopped. These are the results so far; a complete search may find more."
         )
     if outcome.status == "budget":
-        said.append(
-            "The search ended at its computing budget; a search with --thorough may find more."
-        )
+        said.append("The search ended at its computing budget; a thorough search may find more.")
     return tuple(readable(s) for s in said)
 
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from dearig.batch.trends import VERDICTS, Change, Effect, Trend, Trends
+from dearig.batch.trend import VERDICTS, Change, Effect, Trend
+from dearig.batch.trends import Trends
 from dearig.report.text.numbers import interval, quoted, significant, symbol
 from dearig.report.text.tables import Row, Table
 from dearig.units import name_and_unit

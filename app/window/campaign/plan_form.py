@@ -88,7 +88,6 @@ class PlanForm(QScrollArea):
         self._shows = False  # values are put into the table, not typed
         self.setWidgetResizable(True)
         self.setFrameShape(QScrollArea.Shape.NoFrame)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.form = Form(form_fields(PLAN_TABLE, _TABLES), {}, explain=False)
         self.form.changed.connect(self._field_changed)
         self.grid = QTableWidget(0, 2)
@@ -121,7 +120,7 @@ class PlanForm(QScrollArea):
         column.addWidget(label("Varied", "heading"))
         column.addWidget(self.grid, 1)
         row = QHBoxLayout()
-        row.addWidget(self.keys, 1)
+        column.addWidget(self.keys)
         row.addWidget(self.add_button)
         row.addWidget(self.remove_button)
         column.addLayout(row)

@@ -139,7 +139,7 @@ class Plot(pg.PlotItem):
         text = self.axis_texts[side]
         words, points, room = escape(str(text)), _KEY_POINTS, self.vb.height()
         if side == "left" and text.unit and self.key.width_of(str(text)) > room > 0.0:
-            room = max(room, self.size().height() - _GAP)  # up to the next plot
+            room += self.key.size().height()  # half of it on each side
             name, share = text.name, room / max(self.key.width_of(text.name), 1.0)
             points = max(_LEAST_POINTS, _KEY_POINTS * min(1.0, share))
             while len(name) > 1 and self.key.width_of(name) * points / _KEY_POINTS > room:

@@ -435,7 +435,6 @@ class RigPage(Page):
             area = QScrollArea()
             area.setWidgetResizable(True)
             area.setFrameShape(QScrollArea.Shape.NoFrame)
-            area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
             self.tabs.addTab(area, table)
             self._areas[table] = area
         self.tabs.currentChanged.connect(self._tab_changed)

@@ -13,7 +13,8 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidget
 
 from dearig.batch.table_file import read_table
-from dearig.batch.trends import Trend, Trends, find_trends
+from dearig.batch.trend import Trend
+from dearig.batch.trends import Trends, find_trends
 from dearig.report.text.tables import Table
 from dearig.report.text.trends import (
     change_table,

@@ -136,8 +136,8 @@ class Clients:
             if self._device.drives(name):
                 self._make_safe(
                     name,
-                    f"it was silent for more than {self._timeout:g} s (--client-timeout) with a "
-                    f"voltage at the film",
+                    f"it was silent for more than {self._timeout:g} s, the time limit of clients, "
+                    f"with a voltage at the film",
                 )
 
     def _forget(self, now: float) -> None:

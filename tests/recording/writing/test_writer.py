@@ -74,7 +74,7 @@ def test_the_layout_is_the_contract(tmp_path: Path) -> None:
 
         amplifier = entry["instrument/amplifier"]
         assert said(amplifier, "serial") == "1234"
-        assert amplifier["settings"].asstr()[()].tolist() == [["gain", "1000 V/V"]]
+        assert amplifier.attrs["settings"].tolist() == [b"gain", b"1000 V/V"]
         assert entry["sample/film/length"][()] == 0.075
         assert said(entry["sample/film/length"], "units") == "m"
         assert text(entry["sample/film/kinematics"]) == "constrained-width"

@@ -66,6 +66,8 @@ def test_values_that_differ_name_their_recordings():
         (["/usr/lib/app/cli/__main__.py", "demo"], "dearig demo"),
         (["fits.py", "--fast"], "fits --fast"),
         ([""], "python"),
+        (["dearig", "--notify-webhook", "https://a.org/SECRET"], "dearig --notify-webhook ..."),
+        (["dearig", "--notify-webhook=https://a.org/SECRET"], "dearig --notify-webhook=..."),
     ],
 )
 def test_command_line_is_that_of_the_process(monkeypatch, argv, command):

@@ -1,17 +1,22 @@
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+import dearig
 from dearig.errors import InputError
 from dearig.report.pages import pdf
 from dearig.report.pages.html import write_page
 from dearig.report.pages.pdf import print_report, write_pdf
+from dearig.report.pages.seal import _HEAD, sealed
 
-PAGE = '<!DOCTYPE html><head><meta charset="utf-8"><meta name="generator" content="dearig"></head>'
+PAGE = sealed(f"{_HEAD}<title>t</title></head><body><p>a &lt; b</p></body></html>\n")
 
 
 @pytest.fixture
@@ -28,7 +33,9 @@ def prints(monkeypatch):
         return subprocess.CompletedProcess(command, 0, b"", b"")
 
     monkeypatch.setattr(shutil, "which", lambda name: name if name == "chromium" else None)
-    monkeypatch.setattr(pdf.subprocess, "run", run)
+    # of this module alone: libraries start programs while they are imported
+    alone = SimpleNamespace(run=run, TimeoutExpired=subprocess.TimeoutExpired)
+    monkeypatch.setattr(pdf, "subprocess", alone)
     monkeypatch.delenv(pdf.BROWSER, raising=False)
     return pages
 
@@ -41,10 +48,51 @@ def test_a_report_is_printed_beside_itself_and_nothing_is_left(tmp_path, prints)
 
 
 def test_only_reports_of_this_program_are_printed(tmp_path, prints):
-    (tmp_path / "page.html").write_text("<script>1</script>", encoding="utf-8")
-    with pytest.raises(InputError, match="is no report of this program"):
+    for page, words in (
+        ("<p>hello</p>", "is no report of this program"),
+        (PAGE.replace("a &lt;", "c &lt;"), "was changed after it was written"),
+        (sealed("<p>x</p>" + _HEAD), "is no report of this program"),
+        (sealed(_HEAD.replace("&#39;none&#39;", "*", 1)), "is no report of this program"),
+    ):
+        (tmp_path / "page.html").write_text(page, encoding="utf-8", newline="\n")
+        with pytest.raises(InputError, match=words):
+            print_report(tmp_path / "page.html", tmp_path / "page.pdf")
+    assert prints == []
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        "<script>1</script>", "<IFRAME src=x>", "<!--><b>-->", '<meta http-equiv="refresh">',
+        "<img src=x>", "<link rel=x>", "<object>", "<base href=x>", "<?xml ?>", "<![CDATA[ ]]>",
+        "<foreignObject>", "<title><script>", "</ script>", "<form>", "<image href=x>", "<embed>",
+    ],
+)  # fmt: skip
+def test_a_page_with_anything_that_acts_is_refused(tmp_path, prints, inside):
+    page = PAGE.partition("<!-- dearig")[0].replace("a &lt; b", inside)
+    (tmp_path / "page.html").write_text(sealed(page), encoding="utf-8", newline="\n")
+    with pytest.raises(InputError, match="which no report has"):
         print_report(tmp_path / "page.html", tmp_path / "page.pdf")
     assert prints == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pipes in folders")
+def test_a_pipe_is_no_report(tmp_path, prints):
+    os.mkfifo(tmp_path / "page.html")
+    with pytest.raises(InputError, match="is a pipe, not a file"):
+        print_report(tmp_path / "page.html", tmp_path / "page.pdf")
+    assert prints == []
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium")
+def test_chromium_prints_a_report(tmp_path):
+    """With figures as a run's report has them, and with every switch that keeps it alone."""
+    recording = dearig.record("validation-a-1.0", path=tmp_path / "r.h5")
+    recording.to_html(tmp_path / "report.html")
+    print_report(tmp_path / "report.html", tmp_path / "report.pdf")
+    printed = (tmp_path / "report.pdf").read_bytes()
+    assert printed.startswith(b"%PDF")
+    assert printed.rstrip().endswith(b"%%EOF")
 
 
 def test_a_browser_that_prints_nothing_is_told(tmp_path, prints, monkeypatch):

@@ -382,7 +382,7 @@ def test_the_command_says_where_it_is_and_ends_when_told(number):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--host", "0.0.0.0"], ["--host 0.0.0.0", "--anywhere"]),  # noqa: S104
+        (["--host", "0.0.0.0"], ["host 0.0.0.0", "--anywhere"]),  # noqa: S104
         (["--rig", "sim:x"], ["sim:x", "sim:7"]),
         (["--fault", "sparks@3"], ["sparks@3", "KIND@SECONDS"]),
         (["--port", "70000"], ["--port", "65535"]),
@@ -405,4 +405,4 @@ def test_a_port_in_use_is_named():
         answer = dearig("serve-daqmx", "--port", str(port))
     assert answer.code == 2
     assert f"port {port} on 127.0.0.1" in answer.err
-    assert "--port 0" in answer.err
+    assert "port 0 takes any that is free (--port)" in answer.err

@@ -379,7 +379,7 @@ def test_low_plot_has_its_label_in_two_lines(shown: Shown) -> None:
     label = shown.residual.getAxis("left").label
     assert label.toPlainText().strip() == "Residual (\N{MICRO SIGN}m)"
     shown.residual.restyle(DARK)
-    shown.area.resize(900, 260)
+    shown.area.resize(900, 310)
     QApplication.processEvents()
     assert label.toPlainText().strip() == "Residual\n(\N{MICRO SIGN}m)"
     assert f"color:{DARK.text}" in label.toHtml()

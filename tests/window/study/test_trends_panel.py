@@ -16,7 +16,6 @@ from tests.tools.made_campaign import made_rows
 from tests.window.shown_text import shown_texts
 
 pytest.importorskip("statsmodels", reason='takes the extra "trends"')
-pytest.importorskip("ruptures", reason='takes the extra "trends"')
 
 Keep = Callable[[QWidget], None]
 _PATIENCE = 120_000  # ms; on a machine that may be busy

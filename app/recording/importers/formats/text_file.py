@@ -192,7 +192,8 @@ class TextFile(NamedColumns[Column]):
                     continue
                 if wrong.column in self.optional:
                     raise GapError(wrong.place, wrong.column) from wrong
-                rows = self._read_rows(wanted, skip=True).rows
+                needed = [c for c in wanted if c.name not in self.optional]
+                rows = self._read_rows(needed, skip=True).rows
                 lost = len(self.skipped)
                 raise skip_or_refuse(f"{self.path}, {wrong.place}", lost, rows + lost) from wrong
             pointed = [c.name for c in wanted if c.place in self._pointed]
