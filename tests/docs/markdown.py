@@ -13,7 +13,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("app", "drivers", "model", "recordings", "sim_backend", "tests")
+FOLDERS = ("app", "drivers", "findings", "model", "recordings", "sim_backend", "tests")
 
 
 @dataclass(frozen=True)

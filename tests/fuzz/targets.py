@@ -7,6 +7,7 @@ import json
 import random
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,14 @@ from dearig.config.rigfile import load_rig_file, write_default
 from dearig.config.sequencefile import load_sequence
 from dearig.config.targetfile import EXAMPLE, load_target
 from dearig.drivers.rig import Block
-from dearig.recording import RunMetadata, export_recording, open_recording, save_recording
+from dearig.recording import (
+    RunMetadata,
+    export_recording,
+    open_recording,
+    recover,
+    save_recording,
+)
+from dearig.recording.content.journal import HEAD, MAGIC, PAGE, PIECE
 from dearig.recording.importers.columns.choose import choose
 from dearig.recording.importers.columns.specimen import Specimen
 from dearig.recording.importers.columns.values import values_of
@@ -212,6 +220,29 @@ def read_journal(path: Path) -> None:
         campaign_summary(outcome)
 
 
+def sidecars(folder: Path) -> list[bytes]:
+    """Journals of the first recording, with one page and with two."""
+    content = recordings(folder)[0]
+    size, found = len(content), []
+    for count in (1, 2):
+        parts = [HEAD.pack(MAGIC, size, size, count)]
+        for at in range(0, count * PAGE, PAGE):
+            old = content[at : at + PAGE]
+            parts += [PIECE.pack(at, len(old)), old, old]
+        whole = b"".join(parts)
+        found.append(whole + zlib.crc32(whole).to_bytes(4, "little"))
+    return found
+
+
+def read_beside(path: Path) -> None:
+    """Read and recover the recording that the journal at ``path`` is beside."""
+    recording = path.with_suffix("")
+    if not recording.exists():
+        recording.write_bytes(seeds_of("recordings")[0])
+    open_recording(recording)
+    recover(recording)
+
+
 def rig_files(folder: Path) -> list[bytes]:
     write_default(folder / "rig.toml")
     return [(folder / "rig.toml").read_bytes(), b"[card]\nsample_rate_Hz = 200.0\n"]
@@ -229,6 +260,7 @@ TARGETS: dict[str, Target] = {
     "paths": Target(".toml", paths, mutated_text, load_target, 0.01),
     "plans": Target(".toml", plans, mutated_text, read_plan, 0.05),
     "journals": Target(".jsonl", journals, mutated_text, read_journal, 0.05),
+    "sidecars": Target(".h5.journal", sidecars, mutated_bytes, read_beside, 0.05),
     "rig files": Target(".toml", rig_files, mutated_text, load_rig_file, 0.12),
     "model files": Target(".toml", models, mutated_text, load_model, 0.2),
     "CSV": Target(".csv", exported("csv"), mutated_text, read_table, 0.2),

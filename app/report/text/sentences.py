@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise, pooled_rms
 from dearig.model.readings.noise import LEAD_IN
-from dearig.model.springs import SPRING_LAWS
 from dearig.model.verdict import is_rejected, p_text, smallest_p
 from dearig.report.text.numbers import seconds, significant, symbol
 from dearig.report.text.thesis import SIMULATED_CAVEAT
@@ -29,6 +28,7 @@ __all__ = [
     "few_data_text",
     "identify_summary",
     "listed",
+    "spring_label",
     "undetermined_text",
     "validate_summary",
     "warnings_of",
@@ -42,6 +42,14 @@ _NAMES_MAX = 6  # more recordings than this are counted and not named
 _LIKELY = 0.05  # a strain energy that is less probable is not named
 # RMS over noise floor up to which the residual is almost only noise, and beyond which it is more
 _AT_NOISE, _ABOVE_NOISE = 1.1, 1.5
+
+
+def spring_label(kind: str) -> str:
+    """Return the name of a strain energy as reports have it."""
+    # imports the compiler, which a watcher of runs does without
+    from dearig.model.springs import SPRING_LAWS
+
+    return SPRING_LAWS[kind].shown
 
 
 def listed(names: Iterable[str]) -> str:
@@ -66,7 +74,7 @@ def describe_model(model: Actuator | Strip) -> str:
     """Return springs, branches and effects of a model in a few words."""
     network = model.network
     kinds = sorted({s.kind for s in network.springs})
-    springs = listed(SPRING_LAWS[kind].shown for kind in kinds)
+    springs = listed(map(spring_label, kinds))
     words = f"{springs} springs with {_counted(len(network.branches), 'relaxation branch')}"
     words = words.replace("branchs", "branches")
     effects = [name for name, _ in model.effects]
@@ -121,12 +129,12 @@ def _spring_texts(candidates: Sequence[SpringCandidate]) -> list[str]:
         odds[candidate.spring] = odds.get(candidate.spring, 0.0) + candidate.probability
     chosen = next(c.spring for c in candidates if c.chosen)
     rest = listed(
-        f"{SPRING_LAWS[kind].shown} ({p:.2f})"
+        f"{spring_label(kind)} ({p:.2f})"
         for kind, p in sorted(odds.items(), key=lambda item: -item[1])
         if kind != chosen and p >= _LIKELY
     )
     return [
-        f"Of {len(odds)} strain energies the training data give {SPRING_LAWS[chosen].shown} the "
+        f"Of {len(odds)} strain energies the training data give {spring_label(chosen)} the "
         f"probability {odds[chosen]:.2f}" + (f"; not excluded: {rest}." if rest else ".")
     ]
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dearig.model.springs import SPRING_LAWS
 from dearig.report.text.numbers import NO_VALUE, interval, quoted, significant, symbol
+from dearig.report.text.sentences import spring_label
 from dearig.report.text.thesis import SIMULATED_CAVEAT, table_3
 from dearig.units import SHOWN, parameter_unit
 
@@ -235,7 +235,7 @@ def spring_candidates(candidates: Sequence[SpringCandidate], kind: str) -> Table
     several = len({c.branches for c in candidates}) > 1
     rows = []
     for c in candidates:
-        name = SPRING_LAWS[c.spring].shown + (f", {c.branches} branches" if several else "")
+        name = spring_label(c.spring) + (f", {c.branches} branches" if several else "")
         cells = (
             f"{name}{' *' if c.chosen else ''}",
             f"{c.free}",
