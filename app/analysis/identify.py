@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dearig.analysis.budget import given_values
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.outcomes import (
     BranchTrial,
@@ -39,7 +40,7 @@ from dearig.model.diagnosis.spring_choice import choose_springs
 from dearig.model.effects import EffectValues
 from dearig.model.errors import ModelError
 from dearig.model.film.material import Network
-from dearig.model.fitting import GivenValue, Identification, add_intervals, identify, with_budget
+from dearig.model.fitting import Identification, add_intervals, identify, with_budget
 from dearig.model.readings.records import Record
 from dearig.model.springs import SPRINGS
 from dearig.progress import Progress, quiet
@@ -85,7 +86,7 @@ def identify_recordings(
     """
     check_named_once(train, validation)
     started = clock()
-    given = _given_values(rig_file, drive)
+    given = given_values(rig_file, drive)
     fitted, left_out = read_all(train, drive, ended_early)
     others, also_left_out = read_all(validation, drive, ended_early)
     recordings = recordings_of(fitted)
@@ -319,37 +320,3 @@ def _history(
         "covariance": covariance_table(fit.covariance_names, fit.covariance),
         "uncertainty_budget": budget_table(fit.budget),
     }
-
-
-#: Table and key of a rig file by the value that a fit takes for given.
-_KEYS = {
-    "length": ("film", "length_mm"),
-    "width": ("film", "width_mm"),
-    "thickness": ("film", "thickness_mm"),
-    "permittivity": ("film", "relative_permittivity"),
-    "mass": ("load", "mass_g"),
-    "displacement": ("laser", "mm_per_V"),
-}
-_VOLTAGE = {"command": ("amplifier", "gain_V_per_V"), "monitor": ("amplifier", "monitor_V_per_kV")}
-
-
-def _given_values(rig_file: RigFile | None, drive: str) -> list[GivenValue]:
-    """Return the values whose uncertainty ``rig_file`` states, each with its relative one.
-
-    ``drive`` is command or monitor: the voltage that drives the model, with its scaling. Raises
-    ``InputError`` for one of half of its value or more.
-    """
-    if rig_file is None:
-        return []
-    found = []
-    for name, (table, key) in {**_KEYS, "voltage": _VOLTAGE[drive]}.items():
-        section = getattr(rig_file, table)
-        value, uncertainty = getattr(section, key), getattr(section, f"{key}_uncertainty")
-        if uncertainty > 0.0 and value > 0.0:
-            if uncertainty >= 0.5 * value:
-                raise InputError(
-                    f"{table}.{key}_uncertainty = {uncertainty:g} in the rig file is half of "
-                    f"{table}.{key} = {value:g} or more; a fit cannot allow for so much"
-                )
-            found.append(GivenValue(name, uncertainty / value))
-    return found

@@ -12,6 +12,7 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.recording.importers.columns.chosen import Chosen, Pick
 from dearig.recording.importers.columns.guess import LENGTHS, PULLS
+from dearig.recording.importers.columns.markers import markers_in
 from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
 from dearig.recording.importers.columns.time_faults import (
     check_forward,
@@ -376,8 +377,7 @@ def _step(chosen: Chosen, columns: Sequence[str], rate_Hz: float | None) -> floa
 
 def _place(source: Source, good: np.ndarray) -> Callable[[int], str]:
     """Return a function for the place in the file of one of the ``good`` rows."""
-    kept = np.flatnonzero(good)
-    return lambda at: source.row(int(kept[at]))
+    return lambda at: source.row(int(np.flatnonzero(good)[at]))
 
 
 def _unmarked(
@@ -386,7 +386,7 @@ def _unmarked(
     """Return which rows have no marker for a missing reading, (n,) bool. Changes the warnings."""
     good = np.ones(table["time"].size, dtype=bool)
     for quantity in _MARKED & table.keys():
-        marked, found = _markers_in(table[quantity])
+        marked, found = markers_in(table[quantity])
         if found:
             good &= ~marked
             shown = " and ".join(f"{value:.9g}" for value in found)
@@ -428,7 +428,8 @@ def _good_rows(
         )
     seconds = table["time"]
     if not skip:
-        check_forward(seconds[good], names["time"], _place(source, good), source.path)
+        kept = seconds if good.all() else seconds[good]
+        check_forward(kept, names["time"], _place(source, good), source.path)
         return good
     latest = np.maximum.accumulate(np.where(good, seconds, -np.inf))
     good[1:] &= seconds[1:] > latest[:-1]
@@ -454,35 +455,3 @@ def _note_left_out(chosen: Chosen, values: Values, good: np.ndarray) -> None:
 
 
 _LISTED = 100  # rows whose places are looked up
-
-
-#: How many times farther from 0 than all readings a marker is. An instrument's range is some times
-#: the readings, and the marker is made to lie outside of it.
-_FAR = 100.0
-#: Markers of one column, at most: too near and too far; readings, and different ones, at least.
-_KINDS, _REPEATED, _DIFFERENT = 2, 2, 10
-
-
-def _markers_in(values: np.ndarray) -> tuple[np.ndarray, list[float]]:
-    """Return where ``values`` (n,) hold a marker, (n,) bool, and the markers.
-
-    Markers are repeated exactly, are not most of the values, and are far off all of them.
-    """
-    size = np.abs(values)
-    marked = np.zeros(values.size, dtype=bool)
-    found: list[float] = []
-    while len(found) < _KINDS and not marked.all():
-        left = np.where(marked | ~np.isfinite(size), -1.0, size)
-        extreme = float(left.max())
-        same = left == extreme
-        kinds = np.unique(values[same]).tolist()
-        if extreme <= 0.0 or int(same.sum()) < _REPEATED or len(kinds) + len(found) > _KINDS:
-            break
-        marked |= same
-        found += kinds
-        rest = size[~marked & np.isfinite(size)]
-        if 2 * int(marked.sum()) > values.size or not rest.size:
-            break
-        if 0.0 < _FAR * float(rest.max()) <= extreme and np.unique(rest).size >= _DIFFERENT:
-            return marked, found
-    return np.zeros(values.size, dtype=bool), []
