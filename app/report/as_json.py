@@ -14,6 +14,7 @@ from dearig.analysis.outcomes import (
     pooled_steady_rms,
 )
 from dearig.model.verdict import is_rejected, smallest_p
+from dearig.report.text.laws import effect_named, law_json
 from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
 
@@ -226,6 +227,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "family": step.family,
                 "acts_on": step.acts_on,
                 "parameters": [_effect_number_json(e) for e in step.estimates],
+                "law": law_json(effect_named(step.effect)),
                 "train": _measures_json(stand.train, outcome.kind),
                 "selection": _selection_json(step.stage, after.train, outcome.kind),
                 "validation": _measures_json(stand.validation, outcome.kind),

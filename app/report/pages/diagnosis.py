@@ -15,6 +15,7 @@ from dearig.report.figures.recordings import comparison_figure
 from dearig.report.figures.residual import bin_text, residual_panels
 from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.html import Picture, picture, prefixes, write_page
+from dearig.report.pages.laws import LawView, law_view
 from dearig.report.text.diagnosis import (
     before_after_table,
     dropped_effects,
@@ -64,6 +65,7 @@ class FoundEffect:
     title: str
     about: str
     evidence: tuple[str, ...]
+    law: LawView | None = None
     curves: tuple[Picture, ...] = ()
 
 
@@ -196,6 +198,7 @@ def _steps(outcome: DiagnoseOutcome, names: Iterator[str]) -> tuple[FoundEffect,
                 _capitalised(step_label(step)),
                 _capitalised(about),
                 (*(readable(_with_full_stop(_capitalised(w))) for w in step.evidence), *against),
+                law_view(EFFECTS[step.effect]),
                 curves,
             )
         )

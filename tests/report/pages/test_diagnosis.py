@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from dearig.cli.terminal import diagnosis_tables
+from dearig.formulas import as_text, mathml
 from dearig.model import verdict as verdicts
 from dearig.model.diagnosis.events import Event
+from dearig.model.effects import EFFECTS
 from dearig.model.fitting import Estimate
 from dearig.report.as_json import diagnosis_json
 from dearig.report.figures.diagnosis import (
@@ -424,7 +426,7 @@ class TestJson:
         for step in found["steps"]:
             assert step.keys() == {
                 "effect", "family", "acts_on", "parameters", "train", "selection", "validation",
-                "indistinguishable_from", "evidence", "nearest_named", "curve",
+                "indistinguishable_from", "evidence", "nearest_named", "curve", "law",
             }  # fmt: skip
             assert step["train"].keys() == measures
             assert step["selection"].keys() == plain
@@ -568,3 +570,18 @@ def test_losing_candidates_are_folded_after_the_figures(page):
     assert folded
     assert "details" in found.seen
     assert found.words.index("Measurement and model on validation") < found.words.index("Effects")
+
+
+def test_each_effect_that_is_named_is_defined_where_it_stands(tmp_path):
+    outcome = diagnose_outcome()
+    path = write_diagnosis_report(outcome, tmp_path / "report.html")
+    page = path.read_text(encoding="utf-8")
+    law = EFFECTS["sensor lag"].law
+    assert mathml(law.equations[0]) in page
+    assert "time constant, of the low-pass, in s" in page
+    assert f"Source: {law.source}." in page
+    told = shown(diagnosis_tables(outcome))
+    assert as_text(law.equations[0]) in told
+    assert "time constant, of the low-pass, in s" in told
+    (step,) = diagnosis_json(outcome)["steps"]
+    assert step["law"]["equations"] == list(law.equations)
