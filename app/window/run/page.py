@@ -18,7 +18,6 @@ from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rigs import is_simulated
 from dearig.analysis.hold import HoldPlan
 from dearig.drivers.daqmx.watchdog import watchdog_text
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.high_voltage.status import Reading
 from dearig.window.kit.theme import SPACE
@@ -48,7 +47,7 @@ class RunPage(Page):
         super().__init__(session, parent)
         self.session = session
         self.runner = Runner(session, self)
-        self.faults: FaultPlan | None = None  #: faults of the next simulated run
+        self.faults: tuple[str, ...] = ()  #: faults of the next simulated run
         self.live: Live | None = None
         self._played_hold: HoldPlan | None = None  # of the run that is shown
         self._runs = 0

@@ -21,7 +21,6 @@ from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import CardSettings, LimitsSettings
 from dearig.errors import Interrupted
 from dearig.recording import open_recording
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.campaign.compute import ComputeProcess
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.high_voltage.bar import HighVoltageBar
@@ -306,12 +305,12 @@ def test_a_killed_campaign_says_what_happened_and_what_its_start_does(
 def test_an_interlock_halts_until_a_person_says_what_was_seen(
     qtbot: QtBot, page: CampaignPage, runner: Runner, session: Session
 ) -> None:
-    page.faults = FaultPlan.parse(["arc@0.45"])
+    page.faults = ("arc@0.45",)
     begin(qtbot, page)
     ended(qtbot, runner)
     assert states(page)[0] == "stopped"
     surveyed(qtbot, page)
-    page.faults = None
+    page.faults = ()
     assert runner.status.alarm is not None
     runner.status.acknowledge("Ada")
     assert not page.controls.arm.isEnabled()
