@@ -201,7 +201,7 @@ class TestHeadline:
             assert outcome.verdict == "partly_explained"
             assert headline(outcome) == "Training recordings explained, validation recordings not"
             said = summary(outcome)[0]
-            assert "validation-0.h5 keeps 2.7 times its noise" in said
+            assert "validation-0.h5 keeps 2.70 times its noise" in said
             assert "only noise" not in " ".join(summary(outcome))
             assert diagnosis_json(outcome)["verdict"] == "partly_explained"
             assert diagnosis_json(outcome)["verdict_reasons"] == ["validation"]
