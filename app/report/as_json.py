@@ -207,9 +207,12 @@ def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:
 def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
     """``outcome`` for ``--json`` of diagnose, in the units that the keys end with."""
     # One piece: the document key by key, as the page on JSON lists it.
+    from dearig.report.text.diagnosis import signatures_of
+
     finding, shown = outcome.finding, SHOWN[outcome.kind]
     before, after = outcome.before, outcome.after
     experiment = outcome.experiment
+    residual_before, residual_after = signatures_of(outcome)
     return {
         "format": "dearig-diagnosis/1",
         "title": outcome.title,
@@ -241,9 +244,9 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "final": _stand_json(after),
         "residual_after": {
             "is_noise": all(s.is_noise for s in finding.after),
-            "signature": {s.record: _signature_json(s, outcome.kind) for s in finding.after},
+            "signature": {s.record: _signature_json(s, outcome.kind) for s in residual_after},
         },
-        "residual_before": {s.record: _signature_json(s, outcome.kind) for s in finding.before},
+        "residual_before": {s.record: _signature_json(s, outcome.kind) for s in residual_before},
         "verdict": outcome.verdict,
         "verdict_reasons": list(outcome.judgement.reasons),
         "recommended": "final" if outcome.recommends_final else "baseline",

@@ -116,7 +116,7 @@ class Conclusion:
         return [(other, fit) for _, other, fit in sorted(taken.values(), key=lambda t: t[0])]
 
     def nearest(self, member: str) -> tuple[str, float] | None:
-        """Return the best law with a name in place of a general one, and its RMS over the noise."""
+        """Return the best law with a name in place of a general one, and its cost."""
         if member == DRIFT or not EFFECTS[member].is_general:
             return None
         others = self.found.best.members - {member}
@@ -131,7 +131,7 @@ class Conclusion:
         if not named:
             return None
         cost, name = min(named)
-        return name, math.sqrt(cost)
+        return name, cost
 
     def _form(self) -> float:
         """Return the difference of costs by which no two laws are told apart."""
@@ -184,8 +184,9 @@ class Conclusion:
                 if e.name.startswith(f"{name}: ")
             )
             said = [
-                f"without it the residual is {math.sqrt(without.cost):.3g} times the noise, with "
-                f"it {math.sqrt(best.cost):.3g} times",
+                # of the thinned and whitened readings: not the error over the noise of a table
+                f"without it the mean square of the fit's weighted residuals is "
+                f"{without.cost / best.cost:.3g} times as large",
                 f"without it the information criterion is worse by {worth:.0f}",
                 *(f"{_label(other)} explains these data as well" for other, _ in alike),
             ]
@@ -193,7 +194,7 @@ class Conclusion:
             if nearest is not None:
                 said.append(
                     f"its form is that of no law with a name: {nearest[0]} comes nearest, and "
-                    f"leaves {nearest[1]:.3g} times the noise"
+                    f"leaves {nearest[1] / best.cost:.3g} times the mean square"
                 )
             stage = final
             if i < len(order) - 1:
