@@ -349,11 +349,15 @@ class DiagnoseOutcome:
 
     @property
     def marginals(self) -> dict[str, float]:
-        """The probability of each family that it is among what is missing, as of ``families``."""
-        return dict(self._confirmed(self.finding.marginals))
+        """The probability of each family that it is among what is missing, as of ``families``.
+
+        Empty where the search did not say.
+        """
+        known = self.finding.marginals
+        return dict(self._confirmed(known)) if known else {}
 
     def _confirmed(self, families: tuple[tuple[str, float], ...]) -> tuple[tuple[str, float], ...]:
-        if self.verdict != NOT_CONFIRMED or not families:
+        if self.verdict != NOT_CONFIRMED:
             return families
         left = 1.0
         if self.recommends_final:
