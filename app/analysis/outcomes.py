@@ -18,7 +18,7 @@ from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, STOPPED, Judgem
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
     from dearig.config.modelfile import ModelFile
-    from dearig.model.diagnosis.events import Event
+    from dearig.model.diagnosis.events import OneTimeEvent
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Contribution, Identification
     from dearig.model.readings.measures import Errors
@@ -86,7 +86,7 @@ class Comparison:
     published: Published | None = None
     warnings: tuple[str, ...] = field(default=())
     rms_without_events: float | None = None
-    events: tuple[Event, ...] = ()
+    events: tuple[OneTimeEvent, ...] = ()
     ended: EarlyEnd | None = None
     quiet_count: int = 0
     origin: Origin | None = None
