@@ -263,7 +263,14 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             for c in (*after.train, *after.validation)
             for e in c.events
         ],
-        "families": [{"family": f, "probability": p} for f, p in outcome.families],
+        "families": [
+            {
+                "family": f,
+                "probability": p,
+                "probability_missing": _number(outcome.marginals.get(f)),
+            }
+            for f, p in outcome.families
+        ],
         "unnamed": None
         if finding.unnamed is None
         else {
