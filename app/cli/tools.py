@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -167,6 +167,37 @@ def effects(
             print_line(console, f"  {effect.name} (acts on the {effect.acts_on}): {effect.summary}")
     print_line(console, 'Equations of one: dearig effects "NAME"')
     result = {"format": "dearig-effects/1", "effects": [law_json(e) for e in listed]}
+    write_result(result, json)
+
+
+@commands.command("export-model", rich_help_panel=_MODELS)
+def export_model(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.toml", help="A model file.")],
+    to: Annotated[
+        Literal["latex", "python", "prony"],
+        typer.Option(
+            help="A page of equations with numbers; a Python file that needs NumPy alone; "
+            "strain energy and Prony series for finite-element programs."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="File to write.", show_default="next to the model"
+        ),
+    ] = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Write a model for another program: equations, Python or finite elements."""
+    from dearig.config.modelfile import load_model
+    from dearig.report.model_export.write import KINDS, write_export
+
+    written = model.with_suffix(KINDS[to]) if out is None else out
+    check_files(force, (model,), written, json=json)
+    write_export(load_model(model), to, written, force)
+    print_line(console_for(json), str(written))
+    result = {"format": "dearig-model-export/1", "model": str(model), "to": to, "out": str(written)}
     write_result(result, json)
 
 

@@ -259,6 +259,7 @@ def conclude(
     open_end = verdict in (UNEXPLAINED, PARTLY_EXPLAINED) and found.status != "stopped"
     if open_end or any(s.family == "unknown" for s in steps):
         unnamed = unnamed_of(steps, missing_after, after)
+    fits = list(found.fits.values())
     return Diagnosis(
         verdict=verdict,
         baseline=first,
@@ -276,7 +277,8 @@ def conclude(
         held=held,
         notes=tuple(_notes(end, others, after, held)),
         status=found.status,
-        families=_families(end),
+        families=_families(end, judge.probabilities(fits, found.sought)),
+        marginals=_families(end, judge.marginals(fits, found.sought)),
     )
 
 
@@ -300,13 +302,14 @@ def _label(member: str) -> str:
     return "slow drift of the reading" if member == DRIFT else member
 
 
-def _families(end: Conclusion) -> tuple[tuple[str, float], ...]:
-    """Return the probability of each family, largest first; they add up to 1."""
-    found = end.judge.probabilities(list(end.found.fits.values()), end.found.sought)
+def _families(end: Conclusion, found: dict[str, float]) -> tuple[tuple[str, float], ...]:
+    """Return the probabilities ``found`` of the families for what ``end`` explains, largest first.
+
+    What no fit explains is of no known family.
+    """
     if not end.is_small and not (
         end.found.best.members and end.explained > end.judge.settings.trusted_share
     ):
-        # what no fit explains is of no known family
         left = 1.0 - max(end.explained, 0.0)
         found = {family: p * (1.0 - left) for family, p in found.items()}
         found["unknown"] = found.get("unknown", 0.0) + left

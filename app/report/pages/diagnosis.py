@@ -50,7 +50,7 @@ _VALIDATION_MAX = 6
 
 
 @dataclass(frozen=True)
-class Group:
+class RecordSection:
     """Section of one recording: sentences, wide figures, small figures."""
 
     name: str
@@ -84,8 +84,8 @@ class DiagnosisPage:
     steps: tuple[FoundEffect, ...]
     effects: Table
     unnamed: tuple[str, ...]
-    residuals: tuple[Group, ...]
-    missing: tuple[Group, ...]
+    residuals: tuple[RecordSection, ...]
+    missing: tuple[RecordSection, ...]
     rankings: tuple[tuple[Table, Table], ...]
     dropped_effects: str
     after: tuple[tuple[str, tuple[str, ...]], ...]
@@ -169,7 +169,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         experiment_words=readable(_with_full_stop(outcome.experiment_words)),
         experiments=() if experiments is None else (experiments,),
         sequence="" if outcome.experiment is None else outcome.experiment.sequence.strip(),
-        parameters=estimate_table(finding.final),
+        parameters=estimate_table(finding.final, outcome.is_rejected),
         provenance=_provenance(outcome),
         film=kind == "film",
     )
@@ -234,7 +234,7 @@ def _unnamed(outcome: DiagnoseOutcome) -> tuple[str, ...]:
 
 def _residual(
     before: Signature, outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
-) -> Group:
+) -> RecordSection:
     kind = outcome.kind
     after = _same(signatures_of(outcome)[1], before.record) if changed else None
     words = [
@@ -267,14 +267,14 @@ def _residual(
         )
         for d in before.dependences
     )
-    return Group(
+    return RecordSection(
         before.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in words), wide, small
     )
 
 
 def _missing(
     missing: MissingStress, outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
-) -> Group:
+) -> RecordSection:
     after = _same(outcome.finding.missing_after, missing.record) if changed else None
     size = math.sqrt(float(np.mean(missing.stress**2)))
     what = "Maxwell stress" if outcome.kind == "actuator" else "measured stress"
@@ -298,7 +298,7 @@ def _missing(
         picture(figure, names, f"Missing stress before, against {name}.")
         for name, figure in drawn.missing_figures(missing, outcome.kind)
     )
-    return Group(missing.record, tuple(words), wide, small)
+    return RecordSection(missing.record, tuple(words), wide, small)
 
 
 def _validation_pictures(

@@ -188,6 +188,7 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
         )
     if outcome.few_data:
         said.append(few_data_text(outcome.few_data))
+    said += _sureness(outcome)
     said += _undetermined(outcome)
     said += _events(outcome)
     said += [_rivals_text(step) for step in finding.steps if step.indistinguishable_from]
@@ -352,11 +353,17 @@ def _error_change(
     )
 
 
+def _sureness(outcome: DiagnoseOutcome) -> list[str]:
+    """Return how probable each family of the effects found is, where that is known."""
+    known, families = outcome.marginals, dict.fromkeys(s.family for s in outcome.finding.steps)
+    said = "The probability that {} is among what is missing is {:.2f}."
+    return [said.format(family_label(f), known.get(f, 0.0)) for f in families if known]
+
+
 def _undetermined(outcome: DiagnoseOutcome) -> Iterator[str]:
     """Yield a sentence on the parameters that the data do not determine; none if there are none."""
-    open_ones = [e.name for e in outcome.finding.final.estimates if e.free and not e.determined]
-    if open_ones:
-        yield undetermined_names_text(open_ones)
+    if weak := [e.name for e in outcome.finding.final.estimates if e.free and not e.determined]:
+        yield undetermined_names_text(weak)
 
 
 def _events(outcome: DiagnoseOutcome) -> Iterator[str]:

@@ -28,7 +28,7 @@ __all__ = [
     "REACTION",
     "HighVoltageStatus",
     "LatchedAlarm",
-    "Reading",
+    "OutputReading",
     "Responsiveness",
     "recording_of",
 ]
@@ -72,7 +72,7 @@ class LatchedAlarm:
 
 
 @dataclass(frozen=True)
-class Reading:
+class OutputReading:
     """Voltage monitor in V, and the time ``seconds`` of ``total`` s in the sequence."""
 
     monitor: float
@@ -118,7 +118,7 @@ class HighVoltageStatus(QObject):
         self._opening.timeout.connect(self._open_start)
         self._ticks = QTimer(self, interval=_TICK)
         self._ticks.timeout.connect(self._tick)
-        self.reading: Reading | None = None
+        self.reading: OutputReading | None = None
         self.run_number = 0
         self._lock: QLockFile | None = None  # while a run goes on
         self.alarm: LatchedAlarm | None = None
@@ -276,7 +276,7 @@ class HighVoltageStatus(QObject):
             return reading.monitor, f"last sample,\n{reading.seconds:.2f} s"
         return math.nan, ""
 
-    def show_reading(self, reading: Reading) -> None:
+    def show_reading(self, reading: OutputReading) -> None:
         """Show the newest samples of a run."""
         if reading != self.reading:
             self.reading = reading

@@ -26,7 +26,7 @@ from dearig.errors import InputError
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.files import check_output
 from dearig.recording.importers import Imported, ImportOptions
-from dearig.recording.importers.listing import Content, Proposal
+from dearig.recording.importers.listing import ColumnGuesses, Content
 from dearig.window.imports.choice import (
     ColumnChoice,
     columns_option,
@@ -202,11 +202,11 @@ class ImportDialog(QDialog):
                 return
         self._begin_choices()
 
-    def _proposal(self) -> Proposal:
+    def _proposal(self) -> ColumnGuesses:
         """Return the proposal for the table that is chosen; an empty one without."""
         name = self.table_box.currentData()
         known = {} if self.content is None else self.content.proposals
-        return known.get("" if name is None else name, Proposal({}, (), ""))
+        return known.get("" if name is None else name, ColumnGuesses({}, (), ""))
 
     def _begin_choices(self) -> None:
         """Fill the boxes: as remembered, or else with what is sure."""

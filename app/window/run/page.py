@@ -19,7 +19,7 @@ from dearig.acquisition.rigs import is_simulated
 from dearig.analysis.hold import HoldPlan
 from dearig.drivers.daqmx.watchdog import watchdog_text
 from dearig.window.high_voltage.state import HighVoltage
-from dearig.window.high_voltage.status import Reading
+from dearig.window.high_voltage.status import OutputReading
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, label
 from dearig.window.run.controls import RunControls
@@ -267,7 +267,7 @@ class RunPage(Page):
         if self.runner.running:
             seconds, total = now.samples / now.rate, now.total / now.rate
             monitor = now.values.get("monitor", float("nan"))
-            self.runner.status.show_reading(Reading(monitor, seconds, total))
+            self.runner.status.show_reading(OutputReading(monitor, seconds, total))
             playing = next((s[0] for s in self._segments if s[1] <= seconds < s[2]), "")
             self.controls.show_progress(now, playing)
 

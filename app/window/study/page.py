@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.analysis.readings.compatibility import BRANCHES_MAX
-from dearig.analysis.study import Study, Task
+from dearig.analysis.study import Study, StudyRequest
 from dearig.errors import InputError
 from dearig.model.springs import SPRINGS
 from dearig.recording.files import check_output, replaced_when_done
@@ -215,9 +215,9 @@ class StudyPage(Page):
 
     # job
 
-    def task(self) -> Task:
+    def task(self) -> StudyRequest:
         """Return the task of the form."""
-        return Task(
+        return StudyRequest(
             diagnose=self.diagnose.isChecked(),
             train=self.recordings.train,
             validation=self.recordings.validation,

@@ -11,7 +11,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.importers.columns.chosen import LIKELY, Chosen, Pick, own_name
-from dearig.recording.importers.columns.proposal import Proposal, counts, is_even, values_in
+from dearig.recording.importers.columns.proposal import ColumnProposal, counts, is_even, values_in
 from dearig.recording.importers.quantities.clock_numbers import by_sixties, counts_days, epoch_unit
 from dearig.recording.importers.quantities.labels import (
     DIMENSIONS,
@@ -75,7 +75,7 @@ class Guess:
             use_monitor(self._chosen)
             return
         if not set(FILM) & there.keys() and not film and not any(map(self._asked, FILM)):
-            Proposal(self._chosen, self._labels, self._free, self._timed).fill()
+            ColumnProposal(self._chosen, self._labels, self._free, self._timed).fill()
             return
         self._check_sheared()
         self._take_one(LENGTHS, ("displacement",))
