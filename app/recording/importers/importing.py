@@ -10,7 +10,7 @@ from pathlib import Path
 from threading import Event as Flag
 
 from dearig.drivers.rig import Event
-from dearig.errors import InputError
+from dearig.errors import InputError, Note
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.progress import Progress, part, quiet
 from dearig.recording.content.assumed import ASSUMED, FILM_VALUES, assumed_of
@@ -18,7 +18,7 @@ from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
 from dearig.recording.files import check_output, file_sha256
 from dearig.recording.importers.columns.choose import choose
-from dearig.recording.importers.columns.chosen import Chosen, command_line
+from dearig.recording.importers.columns.chosen import Chosen, import_command
 from dearig.recording.importers.columns.plausible import doubts
 from dearig.recording.importers.columns.specimen import Specimen
 from dearig.recording.importers.columns.unsure import UnsureError, question
@@ -64,8 +64,8 @@ class ImportOptions:
         Scales of a rig file from volts at the card, by quantity.
     guess : bool
         Choose columns by their names too. Without it, ``columns`` are all.
-    typed : tuple of str
-        Further words of the command line, for commands in messages.
+    typed : tuple of (str, str or float)
+        Further options of the command with their values, for the command that an error proposes.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -78,7 +78,7 @@ class ImportOptions:
     raw: Mapping[str, Scale] = field(default_factory=dict)
     table: str | None = None
     guess: bool = True
-    typed: tuple[str, ...] = ()
+    typed: tuple[tuple[str, str | float], ...] = ()
 
     def __post_init__(self) -> None:
         if self.kinematics is not None and self.kinematics not in KINEMATICS:
@@ -136,8 +136,8 @@ def import_file(
     the file's name by default. ``progress`` gets the fraction of the whole import.
 
     Raises ``InputError``, with nothing written, for data that cannot be a recording, and where it
-    is not sure which column is which: then with the command that imports what seems right. An
-    interrupt leaves nothing behind.
+    is not sure which column is which: then its ``remedy`` is the command that imports what seems
+    right. An interrupt leaves nothing behind.
     """
     options = options or ImportOptions()
     path = Path(source)
@@ -145,11 +145,11 @@ def import_file(
     try:
         found = prepare(path, options, metadata=metadata, progress=part(progress, 0.0, WRITING))
     except UnsureError as error:
-        raise InputError(question(error, path, out, options.columns, _typed(options))) from error
+        raise question(error, path, out, options.columns, _typed(options)) from error
     except NeedsOptionError as error:
-        more = [*_typed(options), *error.words]
-        line = command_line(path, out, options.columns, options.table, more)
-        raise InputError(f"{error}; run: {line}") from error
+        more = [*_typed(options), *error.answers]
+        command = import_command(path, out, options.columns, options.table, more)
+        raise InputError(str(error), remedy=command) from error
     save_recording(
         out,
         found.values.kind,
@@ -230,21 +230,15 @@ def prepare(
     )
 
 
-def _typed(options: ImportOptions) -> list[str]:
-    """Return ``options`` as words of a command line."""
-    words = []
-    for name, value in (
-        ("--gauge-length-mm", options.gauge_length_mm),
-        ("--area-mm2", options.area_mm2),
-        ("--kinematics", options.kinematics),
-        ("--rate-Hz", options.rate_Hz),
-        ("--names-line", options.names_line),
-    ):
-        if value is not None:
-            words += [name, f"{value:g}" if isinstance(value, float) else str(value)]
-    if options.skip_bad_rows:
-        words.append("--skip-bad-rows")
-    return [*words, *options.typed]
+def _typed(options: ImportOptions) -> list[tuple[str, str | float]]:
+    """Return the ``options`` that are given, with their values."""
+    given = [
+        (name, value)
+        for name in ("gauge_length_mm", "area_mm2", "kinematics", "rate_Hz", "names_line")
+        if (value := getattr(options, name)) is not None
+    ]
+    skips = [("skip_bad_rows", True)] if options.skip_bad_rows else []
+    return [*given, *skips, *options.typed]
 
 
 def _provenance(
@@ -315,9 +309,12 @@ def _of_actuator(
             noted[ASSUMED] = ", ".join(names)
     if assumed := assumed_of(film, load, noted):
         values.notes.append(
-            f"fits of these data take {' and '.join(assumed)} of the thesis: give yours with "
-            f"--rig-file or the options of the film"
-        )
+            Note(
+                f"fits of these data take {' and '.join(assumed)} of the thesis: give yours",
+                option=("rig_file", "film_length_mm", "film_width_mm", "film_thickness_um",
+                        "permittivity", "kinematics", "load_g"),
+            )
+        )  # fmt: skip
     return film
 
 
@@ -328,8 +325,8 @@ def _events(values: Values, exported_before: tuple[Event, ...]) -> list[Event]:
     """
     last = values.columns["time"].size - 1
     found = [replace(event, sample=min(event.sample, last)) for event in exported_before]
-    found += [Event(0, "info", sentence) for sentence in values.notes]
-    found += [Event(0, "warning", sentence) for sentence in values.warnings]
+    found += [Event(0, "info", str(sentence)) for sentence in values.notes]
+    found += [Event(0, "warning", str(sentence)) for sentence in values.warnings]
     for sample, places in sorted(values.left.items())[:_EVENTS_MAX]:
         shown = ", ".join(places[:5]) + (f" and {len(places) - 5} more" if len(places) > 5 else "")
         found.append(Event(min(sample, last), "warning", f"left out before this sample: {shown}"))
