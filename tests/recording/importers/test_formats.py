@@ -17,6 +17,7 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 from dearig.recording import import_file, open_recording
+from dearig.recording.importers.formats.tdms_file import TdmsChannels
 from dearig.recording.importers.listing import preview
 from tests.tools.imports import (
     MOVED,
@@ -397,6 +398,30 @@ def test_tdms_units_scales_and_time_stamps(tmp_path: Path) -> None:
     run = taken(path)
     np.testing.assert_array_equal(run.voltage_command, counts * 0.25)
     np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+
+
+def test_tdms_time_stamps_keep_each_microsecond(tmp_path: Path) -> None:
+    start = np.datetime64("2024-03-01T12:00:00.000000")
+    rows = np.arange(1000)  # at 1 MHz: npTDMS reads some stamps a microsecond early
+    volts = np.where(rows < 200, 0.0, rows - 200.0)
+    path = tdms(
+        tmp_path / "in.tdms",
+        ChannelObject("Log", "voltage_V", volts),
+        ChannelObject("Log", "displacement_mm", 1e-6 * volts**2),
+        ChannelObject("Log", "time_s", start + rows),
+    )
+    np.testing.assert_allclose(taken(path).time, 1e-6 * rows, rtol=0, atol=1e-15)
+
+
+def test_tdms_starts_of_waveforms_keep_each_microsecond(tmp_path: Path) -> None:
+    start = np.datetime64("2024-03-01T12:00:00.000000")
+    begun = [c.properties | {"wf_start_time": start + us} for us, c in enumerate(channels())]
+    path = tdms(
+        tmp_path / "in.tdms",
+        *(ChannelObject("Log", n, v, p) for p, (n, v) in zip(begun, RAW.items(), strict=True)),
+    )
+    found = [column.start_s for column in TdmsChannels(path)._columns.values()]
+    np.testing.assert_allclose(found, 1e-6 * np.arange(len(RAW)), rtol=0, atol=1e-15)
 
 
 def big_endian() -> bytes:
