@@ -3,8 +3,8 @@
 #
 # Expected: the text of the first 116 bytes tells the version, as MATLAB writes "MATLAB 7.3 MAT-file" for HDF5.
 # Seen: save_to_mat(..., version="v7.3") writes HDF5 behind a text that says 5.0. The two version bytes are right.
-#     SciPy and mat-io go by those and recognise HDF5; whoever goes by the text takes the file for version 5 and
-#     finds no element of version 5 in it.
+#     SciPy and mat-io go by those and recognise HDF5; whoever goes by the text takes the file for one of
+#     version 5.
 # Versions: mat-io 1.0.2, SciPy 1.17.1, h5py 3.16.0.
 # Who is hurt: importers and archives that choose a reader by the text; they call a sound file damaged.
 set -euo pipefail

@@ -7,7 +7,7 @@
 #     their documentation names lists of virtual channels.
 # Version: nidaqmx 1.7.0. No driver is needed.
 # Who is hurt: scripts that pass a list of global channels, kept in MAX and numbered by hand over the years, to a
-#     task. Where both ch9 and ch09 exist, the wrong sensor is read without an error.
+#     task: the string names ch09 where ch9 was asked for.
 set -euo pipefail
 
 folder=$(mktemp -d)

@@ -8,7 +8,7 @@
 #     four.
 # Versions: nidaqmx 1.7.0, grpcio 1.85.3, with a server that records what it is asked.
 # Who is hurt: people who number their sensors (gauge09, film12) and move a script from a local card to a remote
-#     one: it fails at the first property of the object returned.
+#     one: each property of the object returned is asked of channels that do not exist.
 set -euo pipefail
 
 folder=$(mktemp -d)

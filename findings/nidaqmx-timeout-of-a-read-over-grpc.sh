@@ -4,7 +4,7 @@
 # Expected: task.read(timeout=0.5) returns or raises after about half a second.
 # Seen: over gRPC the number is only a field of the request. The call itself has no deadline, so a server that
 #     answers after 4 s keeps the caller for 4 s, and no error follows. The server here is made from the service that
-#     the package ships; it stands for a busy server, a card that hangs, or a network that swallows packets.
+#     the package ships; it stands for a busy server, or a card that hangs.
 # Versions: nidaqmx 1.7.0, grpcio 1.85.3.
 # Who is hurt: control loops and interlocks that rely on the timeout to notice that no readings arrive. With high
 #     voltage on the output they need a deadline of their own.

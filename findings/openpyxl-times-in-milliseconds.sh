@@ -2,9 +2,9 @@
 # openpyxl: time stamps are read to the millisecond, although the file holds them to some microseconds.
 #
 # Expected: a workbook that openpyxl wrote gives the same times when openpyxl, or pandas by it, reads it.
-# Seen: the cell holds the full number (to some two microseconds), and reading
-#     rounds it to a millisecond. At 5 kHz the times come in groups of three and five equal ones: time stands still,
-#     then jumps. The same cell read as a number, by its data in the XML, has all samples apart.
+# Seen: the cell holds the full number (to some two microseconds), and reading rounds it to a millisecond. At 5 kHz
+#     the times come in groups of three and five equal ones: time stands still, then jumps. The numbers in the XML
+#     of the same cells keep all samples apart.
 # Versions: openpyxl 3.1.5, pandas 3.1.1.
 # Who is hurt: people who get a workbook with clock times from a logger at more than 1 kHz: speeds become infinite,
 #     and a check for equal times throws rows away.

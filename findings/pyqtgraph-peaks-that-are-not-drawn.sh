@@ -31,14 +31,14 @@ print("pyqtgraph", version("pyqtgraph"), "PySide6", version("PySide6-Essentials"
 application = pyqtgraph.mkQApp()
 
 
-def drawn(values: np.ndarray) -> tuple[float, float]:
-    """The last x and the largest y that are drawn."""
+def drawn(values: np.ndarray) -> tuple[float, float, float]:
+    """The last x and the largest y that are drawn, and the upper end of the range of y."""
     item = pyqtgraph.PlotDataItem(np.arange(len(values)), values)
     item.setDownsampling(ds=BIN, auto=False, method="peak")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         x, y = item.getData()
-        return float(x[-1]), float(np.nanmax(y))
+        return float(x[-1]), float(np.nanmax(y)), float(item.dataBounds(1)[1])
 
 
 seen = {}
@@ -49,9 +49,11 @@ for case, at in (("in the middle", 504), ("in the last samples", ROWS - 5)):
 current = np.zeros(ROWS)
 current[504], current[507] = 5.0, np.nan
 seen["in the middle, 3 samples before a NaN"] = drawn(current)
-for case, (last, largest) in seen.items():
-    print(f"spike of 5.0 {case}: {ROWS} samples, drawn up to {last:.0f}, largest drawn {largest}")
-assert [largest for _, largest in seen.values()] == [5.0, 0.0, 0.0], "changed"
-assert all(last < ROWS - 9 for last, _ in seen.values()), "changed"
+for case, (last, largest, upper) in seen.items():
+    print(f"spike of 5.0 {case}: {ROWS} samples, drawn up to {last:.0f}")
+    print(f"    largest drawn {largest}, range of the axis up to {upper}")
+assert [largest for _, largest, _ in seen.values()] == [5.0, 0.0, 0.0], "changed"
+assert [upper for _, _, upper in seen.values()] == [5.0, 0.0, 0.0], "changed"
+assert all(last < ROWS - 9 for last, _, _ in seen.values()), "changed"
 EOF
 QT_QPA_PLATFORM=offscreen venv/bin/python finding.py

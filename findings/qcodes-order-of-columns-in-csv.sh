@@ -3,11 +3,11 @@
 #
 # Expected: columns in the order in which the parameters were registered, or names that tell which is which.
 # Seen: the file has no header line, and the dependent parameters come in alphabetical order: registered as
-#     voltage, displacement they are written as displacement, voltage. Only an odd order in the data gives it away.
-#     Adding a parameter whose name sorts earlier moves the columns of all later files.
+#     voltage, displacement they are written as displacement, voltage.
+#     A parameter added later, whose name sorts earlier, moves the columns of all later files.
 # Version: qcodes 0.58.0.
 # Who is hurt: people who plot the file by column number; kV and mm are exchanged without an error. The netCDF
-#     export of the same run has names and units.
+#     export of the same run has names.
 set -euo pipefail
 
 folder=$(mktemp -d)

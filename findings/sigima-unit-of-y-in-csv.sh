@@ -2,9 +2,9 @@
 # Sigima (DataLab): the CSV of one signal keeps the unit of x and loses that of y.
 #
 # Expected: both axes have a label and a unit, so the header line says "time (s),displacement (mm)".
-# Seen: the header is "time (s),displacement": the unit of y is written for no signal, while that of x is.
-#     Reading the file back by Sigima gives an empty unit of y. A reader who sees "(s)" has reason to think that
-#     displacement has no unit, or is in metres.
+# Seen: the header is "time (s),displacement": the unit of x is written, that of y is not. Reading the file back by
+#     Sigima gives an empty unit of y. A reader who sees "(s)" has reason to think that displacement has no unit, or
+#     is in metres.
 # Version: sigima 1.3.0.
 # Who is hurt: people who hand curves on as CSV: a factor of 1000 between mm and m, with a header that looks complete.
 #     The HDF5 file of the same program keeps all.

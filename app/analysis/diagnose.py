@@ -11,13 +11,14 @@ from typing import Any
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.run import RunOptions, record
+from dearig.analysis.budget import diagnosis_with_budget, given_values
 from dearig.analysis.cores import for_simulations
-from dearig.analysis.experiment import separating_experiment
+from dearig.analysis.experiment import experiment_of
 from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
     Evaluation,
-    SeparatingExperiment,
+    budget_table,
     covariance_table,
     pooled_rms,
 )
@@ -27,7 +28,6 @@ from dearig.analysis.readings.compatibility import (
     base_model,
     check_apart,
     check_branches,
-    of_rig,
 )
 from dearig.analysis.readings.enough import check_enough, extrapolated, few_data
 from dearig.analysis.readings.opening import Source, check_named_once
@@ -49,6 +49,7 @@ from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
+from dearig.model.fitting import GivenValue
 from dearig.model.fitting.prediction import prediction_error, prediction_gain
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
@@ -98,6 +99,7 @@ def diagnose_recordings(
     others, also_left_out = settings.read(validation)
     base, quality = _prepared(fitted, others, settings)
     finding = _search(fitted, others, base, settings, progress)
+    finding = _budgeted(finding, fitted, settings, progress)
     said = (*left_out, *also_left_out, *quality)
     return _outcome(fitted, others, finding, said, settings, "", started, clock)
 
@@ -162,6 +164,7 @@ def diagnose_rig(
         notes = (*finding.notes, f"Recording ended before all runs were made: {ended}")
         finding = replace(finding, interrupted=stopped, notes=notes)
     _, quality = _prepared(fitted, others, settings)
+    finding = _budgeted(finding, fitted, settings, progress)
     outcome = _outcome(
         fitted, others, finding, quality, settings, address, started, clock, performed
     )
@@ -184,6 +187,11 @@ class _Settings:
     def rig(self) -> RigFile:
         """The rig file, or the thesis's rig."""
         return self.rig_file or RigFile()
+
+    @property
+    def given(self) -> list[GivenValue]:
+        """The values that are given, whose uncertainties the rig file states."""
+        return given_values(self.rig_file, self.drive)
 
     def read(self, sources: Sequence[Source | Readings]) -> tuple[list[Readings], list[str]]:
         """Return the readings of ``sources`` to use, and a sentence on each that is left out."""
@@ -277,7 +285,7 @@ def _search_and_separate(
         if finding.interrupted or len(performed) >= experiments:
             return readings, finding, performed, None
         noise = _noise(readings)
-        experiment, words = _experiment(finding, noise, settings.rig)
+        experiment, words = experiment_of(finding, noise, settings.rig)
         if experiment is None:
             return readings, finding, performed, None
         name = _experiment_name(len(performed))
@@ -296,6 +304,7 @@ def _prepared(
 ) -> tuple[Any, tuple[str, ...]]:
     """Return the baseline to fit, and sentences on the readings. Raises ``InputError``."""
     check_branches(settings.branches)
+    _ = settings.given  # refused before the search, not after it
     recordings, every = recordings_of(fitted), (*fitted, *others)
     check_apart(recordings, recordings_of(others))
     base = base_model(
@@ -342,6 +351,16 @@ def _search(
         raise InputError(f"these recordings cannot be diagnosed: {error}") from error
 
 
+@for_simulations()
+def _budgeted(
+    finding: Diagnosis, fitted: Sequence[Readings], settings: _Settings, progress: Progress
+) -> Diagnosis:
+    """Return ``finding`` with the uncertainties of given values, but for the operator's stop."""
+    records = [(each.held() if finding.held else each).record for each in fitted]
+    with Interrupts() as interrupts:
+        return diagnosis_with_budget(finding, records, settings.given, progress, interrupts.asked)
+
+
 def _outcome(
     fitted: Sequence[Readings],
     others: Sequence[Readings],
@@ -382,7 +401,7 @@ def _outcome(
         "No experiment is proposed: the recordings are of films, which no voltage sequence drives.",
     )
     if fitted[0].kind == "actuator":
-        experiment, words = _experiment(finding, noise, settings.rig)
+        experiment, words = experiment_of(finding, noise, settings.rig)
     seconds = clock() - started
     said = (*quality, *dict.fromkeys(failed))
     recordings = recordings_of(fitted)
@@ -513,24 +532,6 @@ def _noise(readings: Sequence[Readings]) -> float:
     return math.sqrt(sum(r.noise**2 * r.measured.size for r in records) / samples)
 
 
-def _experiment(
-    finding: Diagnosis, noise: float, rig_file: RigFile
-) -> tuple[SeparatingExperiment | None, str]:
-    """Return the experiment that separates the final model from its rivals, and a sentence."""
-    final = finding.final.model
-    if not isinstance(final, Actuator) or not finding.rivals:
-        return None, "No other family explains these data as well: there is nothing to separate"
-    contested = [s for s in finding.steps if s.indistinguishable_from] or list(finding.steps)
-    label = " with ".join(name for name, _ in final.effects) or "the baseline"
-    family = contested[0].family if contested else "none"
-    rivals = [(label, family, final)]
-    for family_of, model in finding.rivals:
-        if isinstance(model, Actuator):
-            label = " with ".join(name for name, _ in model.effects) or "the baseline"
-            rivals.append((label, family_of, model))
-    return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)
-
-
 def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[str, Any]:
     """Return the origin of the model, for its file."""
     finding, stands = outcome.finding, outcome.stands
@@ -582,9 +583,11 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
                 "high95": e.high if math.isfinite(e.high) else None,
                 "determined": e.determined,
                 "at_bound": e.at_bound,
+                "systematic": e.systematic,
                 "note": e.note,
             }
             for e in stage.estimates
         ],
         "covariance": covariance_table(stage.covariance_names, stage.covariance),
+        "uncertainty_budget": budget_table(stage.budget),
     }

@@ -15,6 +15,7 @@ import tomli_w
 from dearig.acquisition.plan import Plan, plan
 from dearig.acquisition.prediction import peaks_of
 from dearig.analysis.outcomes import SeparatingExperiment
+from dearig.analysis.readings.compatibility import of_rig
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
@@ -22,11 +23,12 @@ from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.interlocks import would_trip
 from dearig.drivers.samples import Repeated
 from dearig.errors import InputError
+from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.kernel import OK
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import THESIS_AMPLITUDES
 
-__all__ = ["SEPARATES", "candidates", "separating_experiment"]
+__all__ = ["SEPARATES", "candidates", "experiment_of", "separating_experiment"]
 
 #: RMS difference of two predictions, in noise floors, from which an experiment separates them.
 SEPARATES = 0.5
@@ -256,3 +258,21 @@ def _rms(values: np.ndarray) -> float:
 
 def _and(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
+
+
+def experiment_of(
+    finding: Diagnosis, noise: float, rig_file: RigFile
+) -> tuple[SeparatingExperiment | None, str]:
+    """Return the experiment that separates the final model from its rivals, and a sentence."""
+    final = finding.final.model
+    if not isinstance(final, Actuator) or not finding.rivals:
+        return None, "No other family explains these data as well: there is nothing to separate"
+    contested = [s for s in finding.steps if s.indistinguishable_from] or list(finding.steps)
+    label = " with ".join(name for name, _ in final.effects) or "the baseline"
+    family = contested[0].family if contested else "none"
+    rivals = [(label, family, final)]
+    for family_of, model in finding.rivals:
+        if isinstance(model, Actuator):
+            label = " with ".join(name for name, _ in model.effects) or "the baseline"
+            rivals.append((label, family_of, model))
+    return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)

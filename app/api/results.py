@@ -27,6 +27,7 @@ from dearig.report.figures.parameters import branches_figure, parameters_figure
 from dearig.report.figures.residual import residual_figure
 from dearig.report.pages.page import write_report
 from dearig.report.text import diagnosis as words
+from dearig.report.text.estimates import effect_table
 from dearig.report.text.sentences import identify_summary, validate_summary, warnings_of
 from dearig.report.text.tables import error_table, parameter_table
 
@@ -429,7 +430,7 @@ class DiagnoseResult:
             if before and after
         ]
         if self.effects:
-            parts.insert(0, table_html(words.effect_table(outcome)))
+            parts.insert(0, table_html(effect_table(outcome)))
         if outcome.after.train:
             parts.append(drawing(self.plot(), "RMS errors before and after"))
         return card(self.headline, *parts, sentences=[*words.summary(outcome), *self.warnings])

@@ -14,7 +14,6 @@ from rich.text import Text
 from dearig.printable import printable
 from dearig.report.text.diagnosis import (
     before_after_table,
-    effect_table,
     experiment_table,
     headline,
     rankings,
@@ -23,6 +22,7 @@ from dearig.report.text.diagnosis import (
     thesis_before_after_table,
     warnings,
 )
+from dearig.report.text.estimates import effect_table
 from dearig.report.text.numbers import to_ascii
 from dearig.report.text.sentences import identify_summary, listed, validate_summary, warnings_of
 from dearig.report.text.tables import (
@@ -113,9 +113,11 @@ def track_table(outcome: TrackOutcome) -> RenderableType:
 
 def trend_tables(trends: Trends) -> RenderableType:
     """Return trends as sentences, the effects, and what to vary next."""
-    from dearig.report.text.trends import effect_table, proposal_texts, trends_texts
+    from dearig.report.text import trends as words
 
-    return _Fitted([*trends_texts(trends), effect_table(trends), *proposal_texts(trends)], ())
+    return _Fitted(
+        [*words.trends_texts(trends), words.effect_table(trends), *words.proposal_texts(trends)], ()
+    )
 
 
 #: States of a campaign that goes on when it is started again.

@@ -293,6 +293,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "performed": list(outcome.performed),
         "parameters": [_effect_number_json(e) for e in finding.final.estimates],
         "covariance": covariance_table(finding.final.covariance_names, finding.final.covariance),
+        "uncertainty_budget": budget_table(finding.final.budget),
         "quality": list(outcome.quality),
         "notes": list(finding.notes),
         "interrupted": finding.interrupted,
@@ -365,6 +366,8 @@ def _effect_number_json(estimate: Estimate) -> dict[str, Any]:
         "unit": estimate.unit,
         "ci95": [_number(estimate.low), _number(estimate.high)],
         "determined": bool(estimate.determined),
+        "systematic": _number(estimate.systematic),
+        "ci95_combined": [_number(end) for end in estimate.combined],
         "at_bound": bool(estimate.at_bound),
         "note": estimate.note,
     }

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
 from dearig.report.as_json import diagnosis_json, outcome_json
 from dearig.report.text import diagnosis, sentences, tables
+from dearig.report.text.estimates import effect_table
 from dearig.report.text.tables import Table
 from dearig.units import readable
 
@@ -104,7 +105,7 @@ def _diagnosis(outcome: DiagnoseOutcome) -> dict[str, Any]:
             pieces.append(diagnosis.before_after_table(heading, before, after, outcome.kind))
     pieces.append(diagnosis.step_table(outcome))
     if finding.steps:
-        pieces.append(diagnosis.effect_table(outcome))
+        pieces.append(effect_table(outcome))
     rounds = diagnosis.rankings(outcome) or ("No round of candidates is complete.",)
     dropped = diagnosis.dropped_effects(outcome)
     proposal: list[str | Table] = [readable(f"{outcome.experiment_words.rstrip('.')}.")]

@@ -53,8 +53,10 @@ class Conclusion:
         self._without = without
         noise = self.judge.is_noise(found.baseline)
         fit = fitter.careful if noise else fitter.identified
-        self.first = fit(found.baseline, _ITERATIONS)
-        self.last = fitter.careful(found.best, _ITERATIONS) if found.best.members else self.first
+        self.first = fit(found.baseline, _ITERATIONS).by_relaxation_time()
+        self.last = self.first
+        if found.best.members:
+            self.last = fitter.careful(found.best, _ITERATIONS).by_relaxation_time()
 
     @property
     def explained(self) -> float:
@@ -85,7 +87,7 @@ class Conclusion:
                 fit = fits[fit.members - {member}]
             elif member != DRIFT:
                 fit = self._without(fit, member)
-        return fit
+        return fit.by_relaxation_time()
 
     def order(self) -> list[str]:
         """Return the members of the best fit: what explains most alone, then with the next, ..."""

@@ -96,6 +96,16 @@ class Fit:
         layout = self.problem.layout
         return layout.model(layout.values(self.x))
 
+    def by_relaxation_time(self) -> Fit:
+        """Return the same fit with its branches in order of relaxation time."""
+        layout = self.problem.layout
+        places = layout.order_by_relaxation_time(layout.values(self.x))
+        free = places[~self.fixed[places]]
+        columns = np.searchsorted(np.flatnonzero(~self.fixed), free)
+        return replace(
+            self, x=self.x[places], fixed=self.fixed[places], jacobian=self.jacobian[:, columns]
+        )
+
     @property
     def free(self) -> int:
         """Number of fitted parameters; the drift's variance is one.

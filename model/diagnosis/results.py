@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dearig.model.effects import EFFECTS, Curve
-from dearig.model.fitting import Estimate
+from dearig.model.fitting import Contribution, Estimate
 from dearig.model.residual import MissingStress, Signature, Unnamed
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
@@ -35,7 +35,8 @@ class Stage:
     ``for_others`` is the model that predicts other recordings, refitted without the effects that
     are specific to these recordings. ``models`` are those of the training records, each with its
     own drift. ``covariance`` (f, f) is that of the fitted parameters ``covariance_names``, in SI
-    units.
+    units. ``budget`` is what the uncertainty of each given value does to the parameters, () where
+    none is known.
     """
 
     model: Actuator | Strip
@@ -49,6 +50,7 @@ class Stage:
     models: tuple[Actuator | Strip, ...] = ()
     covariance_names: tuple[str, ...] = ()
     covariance: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)
+    budget: tuple[Contribution, ...] = ()
 
     def of_each(self, records: int) -> tuple[Actuator | Strip, ...]:
         """Return the models of so many training ``records``."""

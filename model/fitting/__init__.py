@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dearig.model.fitting.budget import with_budget
+from dearig.model.fitting.budget import uncertainty_budget, with_budget, with_systematic
 from dearig.model.fitting.hierarchy import SharedFit, fit_shared
 from dearig.model.fitting.identify import Identification, add_intervals, identify
 from dearig.model.fitting.parameters import Contribution, Estimate, GivenValue
@@ -16,5 +16,7 @@ __all__ = [
     "add_intervals",
     "fit_shared",
     "identify",
+    "uncertainty_budget",
     "with_budget",
+    "with_systematic",
 ]

@@ -9,7 +9,7 @@ difference is the shift. Shifts of independent values add up as squares.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,13 +17,13 @@ import numpy as np
 from dearig.model.errors import ModelError
 from dearig.model.fitting.identify import Identification, coarse_problem
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Contribution, GivenValue, Layout
+from dearig.model.fitting.parameters import Contribution, Estimate, GivenValue, Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress
 from dearig.model.readings.records import ActuatorRecord, Record
 from dearig.model.simulation.actuator import Actuator
 
-__all__ = ["with_budget"]
+__all__ = ["uncertainty_budget", "with_budget", "with_systematic"]
 
 _GAIN = 1e-3  # of chi-square: both refits end at a hundredth of a standard deviation
 _ITERATIONS = 40  # of a refit at most: it starts at an optimum one deviation away
@@ -43,14 +43,36 @@ def with_budget(
     model = fitted.model
     if not isinstance(model, Actuator) or not given:
         return fitted
+    held = np.isin(Layout(model).names, fitted.held_limits)
+    found = uncertainty_budget(records, model, held, given, workers, progress)
+    return replace(fitted, estimates=with_systematic(fitted.estimates, found), budget=found)
+
+
+def uncertainty_budget(
+    records: Sequence[Record],
+    model: Actuator,
+    held: np.ndarray,
+    given: Sequence[GivenValue],
+    workers: int = 2,
+    progress: Progress = lambda *_: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> tuple[Contribution, ...]:
+    """Return what one standard uncertainty of each ``given`` value does to the parameters.
+
+    ``model`` is fitted to the ``records``, with its parameters ``held`` (d,) bool not fitted. A
+    drift that it has is fitted to each record for itself. () where ``stop()`` is True before the
+    end: a part of the contributions is no budget.
+    """
     problem = coarse_problem(Problem(records, Layout(model), workers))
     layout = problem.layout
-    held = np.array([name in fitted.held_limits for name in layout.names])
+    held = held | problem.own
     start = descend(problem, layout.coordinates(layout.initial()), held, gain=_GAIN).x
     done, found = 0, []
     for one in given:
         ends = []
         for sign in (-1.0, 1.0):
+            if stop():
+                return ()
             moved, changed = _moved(problem.records, model, one.name, sign * one.relative)
             other = Problem(moved, Layout(changed), workers)
             x = descend(other, start, held, _ITERATIONS, _GAIN, damping=1e-4).x
@@ -59,18 +81,18 @@ def with_budget(
             progress("uncertainty budget", done / (2 * len(given)))
         shifts = np.where(held, 0.0, 0.5 * (ends[1] - ends[0]))
         found.append(Contribution(one, layout.names, tuple(map(float, shifts))))
-    total = dict(
-        zip(
-            layout.names, np.sqrt(np.sum([np.square(c.shifts) for c in found], axis=0)), strict=True
-        )
-    )
-    return replace(
-        fitted,
-        estimates=tuple(
-            replace(e, systematic=float(total.get(e.name, 0.0))) for e in fitted.estimates
-        ),
-        budget=tuple(found),
-    )
+    return tuple(found)
+
+
+def with_systematic(
+    estimates: Sequence[Estimate], budget: Sequence[Contribution]
+) -> tuple[Estimate, ...]:
+    """Return ``estimates`` with the root sum of squares of each one's shifts by a ``budget``."""
+    squares: dict[str, float] = {}
+    for one in budget:
+        for name, shift in zip(one.names, one.shifts, strict=True):
+            squares[name] = squares.get(name, 0.0) + shift**2
+    return tuple(replace(e, systematic=math.sqrt(squares.get(e.name, 0.0))) for e in estimates)
 
 
 def _moved(

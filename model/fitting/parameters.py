@@ -380,20 +380,23 @@ class Layout:
         Branches with the same kind of spring are interchangeable; a fixed order makes two fits of
         the same data comparable.
         """
+        return values[self.order_by_relaxation_time(values)]
+
+    def order_by_relaxation_time(self, values: np.ndarray) -> np.ndarray:
+        """Return the indices (d,) that ``by_relaxation_time`` takes of ``values`` (d,)."""
+        places = np.arange(self.size)
         kinds = {s.kind for s in self.network.springs[1:]}
         if len(kinds) > 1:
-            return values
-        times = self.column("T")
-        order = np.argsort(values[times], kind="stable")
-        sorted_values = values.copy()
+            return places
+        order = np.argsort(values[self.column("T")], kind="stable")
         alike: dict[tuple[str, int], list[int]] = {}
         for j, q in enumerate(self.quantities):
             if q.kind != "effect" and q.index > 0:
                 alike.setdefault((q.kind, q.place), []).append(j)
         for columns in alike.values():
             if len(columns) == len(order):
-                sorted_values[columns] = values[np.array(columns)[order]]
-        return sorted_values
+                places[columns] = np.array(columns)[order]
+        return places
 
 
 def _shapes(springs: Sequence[Spring]) -> Iterator[Quantity]:

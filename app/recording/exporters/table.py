@@ -76,4 +76,6 @@ def description_of(recording: Recording) -> dict[str, str]:
         "load": json.dumps(asdict(recording.load)) if recording.load else "",
         "sequence": recording.sequence_toml,
         "provenance": json.dumps(recording.provenance),
+        "rest_reading": repr(float(recording.rest_reading)),
+        "events": json.dumps([[e.sample, e.level, e.message] for e in recording.events]),
     }

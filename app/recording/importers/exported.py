@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from dearig.drivers.rig import Event
 from dearig.model.errors import ModelError
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.recording.content.fields import TEXTS
-from dearig.recording.content.layout import FORMAT, ZERO_ORDER
+from dearig.recording.content.layout import EVENT_LEVELS, FORMAT, ZERO_ORDER
 
 __all__ = ["Exported", "exported"]
 
@@ -29,7 +31,8 @@ T = TypeVar("T", Film, Load)
 class Exported:
     """Fields as in a ``Recording``; missing or invalid ones have their defaults.
 
-    ``origin`` has those values of the provenance that say where the data are from.
+    ``origin`` has those values of the provenance that say where the data are from. ``rest_reading``
+    is that of a displacement that is counted from it already, None if the file tells none.
     """
 
     hold: bool = False
@@ -38,6 +41,8 @@ class Exported:
     load: Load | None = None
     sequence: str = ""
     origin: Mapping[str, object] = field(default_factory=dict)
+    rest_reading: float | None = None
+    events: tuple[Event, ...] = ()
 
 
 def exported(about: Mapping[str, str]) -> Exported:
@@ -52,7 +57,29 @@ def exported(about: Mapping[str, str]) -> Exported:
         load=_made(Load, about.get("load", "")),
         sequence=about.get("sequence", ""),
         origin=_origin(about.get("provenance", "")),
+        rest_reading=_number(about.get("rest_reading", "")),
+        events=tuple(_events(about.get("events", ""))),
     )
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _events(text: str) -> Iterator[Event]:
+    """Yield the events that an exporter wrote; none for another text."""
+    try:
+        found = json.loads(text) if text else []
+    except (ValueError, RecursionError):
+        return
+    for row in found if isinstance(found, list) else ():
+        match row:
+            case [int(sample), str(level), str(message)] if sample >= 0 and level in EVENT_LEVELS:
+                yield Event(sample, level, message)
 
 
 def _origin(text: str) -> dict[str, object]:

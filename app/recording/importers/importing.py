@@ -208,7 +208,8 @@ def prepare(
     film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
     rest = 0.0
     if values.kind == "actuator":
-        rest = _from_rest(values)
+        # a displacement that was exported is counted from its rest already
+        rest = _from_rest(values) if was.rest_reading is None else was.rest_reading
         film = _of_actuator(values, film, metadata.load or was.load, kinematics, noted)
     values.warnings += doubts(values.columns, film)
     return Prepared(
@@ -225,7 +226,7 @@ def prepare(
         hold=was.hold and values.kind == "actuator",
         kinematics=kinematics or (None if values.kind == "actuator" else "uniaxial"),
         rest_reading=rest,
-        events=tuple(_events(values)),
+        events=tuple(_events(values, was.events)),
     )
 
 
@@ -320,10 +321,14 @@ def _of_actuator(
     return film
 
 
-def _events(values: Values) -> list[Event]:
-    """Return the events of the recording: what was done, what is doubtful, which rows are left."""
+def _events(values: Values, exported_before: tuple[Event, ...]) -> list[Event]:
+    """Return the events of the recording: what was done, what is doubtful, which rows are left.
+
+    Those ``exported_before`` are those of the recording that the file was exported from.
+    """
     last = values.columns["time"].size - 1
-    found = [Event(0, "info", sentence) for sentence in values.notes]
+    found = [replace(event, sample=min(event.sample, last)) for event in exported_before]
+    found += [Event(0, "info", sentence) for sentence in values.notes]
     found += [Event(0, "warning", sentence) for sentence in values.warnings]
     for sample, places in sorted(values.left.items())[:_EVENTS_MAX]:
         shown = ", ".join(places[:5]) + (f" and {len(places) - 5} more" if len(places) > 5 else "")

@@ -18,8 +18,6 @@ from dearig.report.pages.html import Picture, picture, prefixes, write_page
 from dearig.report.text.diagnosis import (
     before_after_table,
     dropped_effects,
-    effect_table,
-    estimate_table,
     experiment_table,
     family_label,
     headline,
@@ -30,6 +28,7 @@ from dearig.report.text.diagnosis import (
     thesis_before_after_table,
     warnings,
 )
+from dearig.report.text.estimates import effect_table, estimate_table
 from dearig.report.text.numbers import seconds, significant
 from dearig.report.text.sentences import describe_model
 from dearig.report.text.tables import Table
@@ -166,7 +165,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         experiment_words=readable(_with_full_stop(outcome.experiment_words)),
         experiments=() if experiments is None else (experiments,),
         sequence="" if outcome.experiment is None else outcome.experiment.sequence.strip(),
-        parameters=estimate_table(finding.final.estimates),
+        parameters=estimate_table(finding.final),
         provenance=_provenance(outcome),
         film=kind == "film",
     )

@@ -10,23 +10,20 @@ import numpy as np
 
 from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
 from dearig.model.verdict import NOT_CONFIRMED, TOLERANCE
-from dearig.report.text.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
-from dearig.report.text.sentences import few_data_text, listed
-from dearig.report.text.tables import BOUND_MARK, Row, Table
-from dearig.units import SHOWN, parameter_unit, readable
+from dearig.report.text.numbers import NO_VALUE, seconds, significant
+from dearig.report.text.sentences import few_data_text, listed, undetermined_names_text
+from dearig.report.text.tables import Row, Table
+from dearig.units import SHOWN, readable
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
     from dearig.model.diagnosis.results import Round, Step
-    from dearig.model.fitting import Estimate
     from dearig.model.readings.measures import Errors
 
 __all__ = [
     "HEADLINES",
     "before_after_table",
     "dropped_effects",
-    "effect_table",
-    "estimate_table",
     "experiment_table",
     "family_label",
     "headline",
@@ -154,6 +151,7 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
         )
     if outcome.few_data:
         said.append(few_data_text(outcome.few_data))
+    said += _undetermined(outcome)
     said += _events(outcome)
     said += [_rivals_text(step) for step in finding.steps if step.indistinguishable_from]
     if finding.unnamed is not None:
@@ -308,6 +306,13 @@ def _error_change(
         f"{said} Without slow noise, drift and events of each recording it is "
         f"{steady} {shown.error_unit} RMS, {significant(rms[2] / noise)} times the noise."
     )
+
+
+def _undetermined(outcome: DiagnoseOutcome) -> Iterator[str]:
+    """Yield a sentence on the parameters that the data do not determine; none if there are none."""
+    open_ones = [e.name for e in outcome.finding.final.estimates if e.free and not e.determined]
+    if open_ones:
+        yield undetermined_names_text(open_ones)
 
 
 def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
@@ -523,48 +528,6 @@ def dropped_effects(outcome: DiagnoseOutcome) -> str:
     return (
         f"{listed(gone)} {was} not in the final model: {listed(kept)} together explain more, and "
         f"{it} nothing to them."
-    )
-
-
-def effect_table(outcome: DiagnoseOutcome) -> Table:
-    """Return the parameters of the effects found, with intervals and meaning."""
-    from dearig.model.effects import EFFECTS
-
-    rows = []
-    for step in outcome.finding.steps:
-        meanings = {p.name: p.meaning for p in EFFECTS[step.effect].parameters}
-        for e in step.estimates:
-            about = meanings.get(e.name.split(" in ")[0], "")  # may be a parameter of one recording
-            detail = "; ".join(w for w in (about, e.note) if w)
-            rows.append(_estimate(e, f"{step.effect}: {e.name.replace('_', ' ')}", detail))
-    return Table("Fitted parameters", _ESTIMATES, tuple(rows))
-
-
-def estimate_table(estimates: Sequence[Estimate]) -> Table:
-    """Return all parameters of a model."""
-    rows = tuple(_estimate(e, symbol(e.name).replace("_", " "), e.note) for e in estimates)
-    note = ""
-    if any(not e.determined for e in estimates):
-        note = "Values in brackets are not determined by these data."
-    return Table("Parameters", _ESTIMATES, rows, note)
-
-
-_ESTIMATES = (("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", ""))
-
-
-def _estimate(e: Estimate, name: str, detail: str) -> Row:
-    factor, unit = parameter_unit(e.unit)
-    low, high = e.low * factor, e.high * factor
-    value = quoted(e.value * factor, low, high)
-    within = interval(low, high) if e.free else "derived"
-    if e.free and e.low == e.high == e.value:
-        within = NO_VALUE
-    if e.at_bound:
-        within += BOUND_MARK
-    return Row(
-        (name, value if e.determined else f"({value})", unit, within),
-        detail,
-        muted=not e.determined,
     )
 
 

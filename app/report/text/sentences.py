@@ -29,6 +29,7 @@ __all__ = [
     "identify_summary",
     "listed",
     "spring_label",
+    "undetermined_names_text",
     "undetermined_text",
     "validate_summary",
     "warnings_of",
@@ -180,7 +181,12 @@ def undetermined_text(fit: Identification) -> str:
         )
     if not fit.undetermined:
         return "The data determine every parameter."
-    named = listed(symbol(n) for n in fit.undetermined)
+    return undetermined_names_text(fit.undetermined)
+
+
+def undetermined_names_text(names: Iterable[str]) -> str:
+    """Return a sentence on parameters ``names`` that the data do not determine."""
+    named = listed(symbol(n).replace("_", " ") for n in names)
     return (
         f"The data do not determine {named}: other values fit equally well. Do not quote these "
         f"values."

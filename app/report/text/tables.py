@@ -14,14 +14,18 @@ from dearig.units import SHOWN, parameter_unit
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import BranchTrial, Comparison, Published, SpringCandidate
-    from dearig.model.fitting import Identification
+    from dearig.model.fitting import Contribution, Estimate, Identification
 
 __all__ = [
     "BOUND_MARK",
+    "BRACKETS_TEXT",
+    "BUDGET_HEAD",
     "WORD_MAX",
     "Row",
     "Table",
     "branch_trials",
+    "budget_cells",
+    "budget_text",
     "by_thesis_table",
     "error_table",
     "parameter_table",
@@ -81,6 +85,10 @@ class Table:
 
 #: After the interval of a parameter at an end of its search range.
 BOUND_MARK = ", at bound"
+#: Note of a table in which values of parameters stand in brackets.
+BRACKETS_TEXT = "Values in brackets are not determined by these data."
+#: Heads of the columns that an uncertainty budget adds to a table of parameters.
+BUDGET_HEAD = (("Given values", "\N{PLUS-MINUS SIGN}1 sigma"), ("Combined", "95 %"))
 
 _TITLES = {
     "A": "Table A: amplitudes 6 to 8 kV at one frequency (the thesis's Table 4)",
@@ -174,6 +182,25 @@ def thesis_error_table(
     return Table(title, head, tuple(rows), SIMULATED_CAVEAT if compared else "")
 
 
+def budget_cells(e: Estimate, factor: float) -> list[str]:
+    """Return the cells below ``BUDGET_HEAD``, in units of ``factor``."""
+    shifted = e.systematic * factor
+    both = interval(e.combined[0] * factor, e.combined[1] * factor)
+    return [significant(shifted, 2) if shifted else NO_VALUE, both]
+
+
+def budget_text(budget: Sequence[Contribution]) -> str:
+    """Return what the columns ``BUDGET_HEAD`` are, and the uncertainties that they come from."""
+    values = ", ".join(
+        f"{c.given.name} {significant(100.0 * c.given.relative, 2)} %" for c in budget
+    )
+    return (
+        f"The 95 % interval is of the noise alone. Given values, with standard uncertainties "
+        f"by the rig file ({values}), move a parameter by the next column; the last interval "
+        f"has both."
+    )
+
+
 def parameter_table(fit: Identification) -> Table:
     """Return every parameter with its 95 % interval, and the thesis's Table 3 if it applies."""
     published = table_3(fit.model)
@@ -192,10 +219,8 @@ def parameter_table(fit: Identification) -> Table:
             within = BOUND_MARK.lstrip(", ") if e.at_bound else NO_VALUE
         cells = [symbol(e.name), value if e.determined or not known else f"({value})", unit, within]
         if fit.budget:
-            shifted = e.systematic * factor
-            cells.append(significant(shifted, 2) if shifted else NO_VALUE)
-            both = interval(e.combined[0] * factor, e.combined[1] * factor)
-            cells.append(both if known else NO_VALUE)
+            shifted, both = budget_cells(e, factor)
+            cells += [shifted, both if known else NO_VALUE]
         if published:
             theirs = published.get(e.name, math.nan)
             cells.append(significant(theirs * factor, 4))
@@ -203,23 +228,16 @@ def parameter_table(fit: Identification) -> Table:
         rows.append(Row(tuple(cells), e.note if known else "", known and not e.determined))
     head = [("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", "")]
     if fit.budget:
-        head += [("Given values", "\N{PLUS-MINUS SIGN}1 sigma"), ("Combined", "95 %")]
+        head += BUDGET_HEAD
     if published:
         head.append(("Thesis", "Table 3"))
     notes = []
     if fit.budget:
-        values = ", ".join(
-            f"{c.given.name} {significant(100.0 * c.given.relative, 2)} %" for c in fit.budget
-        )
-        notes.append(
-            f"The 95 % interval is of the noise alone. Given values, with standard uncertainties "
-            f"by the rig file ({values}), move a parameter by the next column; the last interval "
-            f"has both."
-        )
+        notes.append(budget_text(fit.budget))
     if any(e.at_bound for e in fit.estimates):
         notes.append("At bound: at an end of the search range; the data may ask for more.")
     if known and fit.undetermined:
-        notes.append("Values in brackets are not determined by these data.")
+        notes.append(BRACKETS_TEXT)
     if published:
         notes.append("Branches, also those of Table 3, are sorted by relaxation time.")
     return Table("Parameters", tuple(head), tuple(rows), " ".join(notes))

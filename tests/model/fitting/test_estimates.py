@@ -12,8 +12,9 @@ from dearig.model.fitting.estimates import BY_CURVATURE, estimates_with_interval
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Estimate
 from dearig.model.fitting.problem import Problem
-from dearig.report.text.diagnosis import estimate_table
+from dearig.report.text.estimates import estimate_table
 from dearig.report.text.tables import parameter_table
+from tests.tools.diagnosis import stage
 from tests.tools.engine import PLAIN, effect, posed, record_of, thesis_drive
 from tests.tools.reports import fit as paper_fit
 
@@ -42,7 +43,8 @@ def test_tables_mark_a_parameter_at_a_bound() -> None:
     ):
         assert "at bound" in parameter_table(fit).rows[0].cells[3]
         assert "the data may ask for more" in parameter_table(fit).note
-    assert "at bound" in estimate_table((ended,)).rows[0].cells[3]
+    table = estimate_table(stage(PLAIN, 1e-6, estimates=(ended,)))
+    assert "at bound" in table.rows[0].cells[3]
 
 
 @pytest.mark.parametrize("lead_in", [0, 800])

@@ -18,6 +18,9 @@ def markers_in(values: np.ndarray) -> tuple[np.ndarray, list[float]]:
 
     Markers are repeated exactly, are not most of the values, and are far off all of them.
     """
+    none = np.zeros(values.size, dtype=bool)
+    if not values.size or not _is_repeated(values):
+        return none, []
     size = np.abs(values)
     marked = np.zeros(values.size, dtype=bool)
     found: list[float] = []
@@ -35,4 +38,11 @@ def markers_in(values: np.ndarray) -> tuple[np.ndarray, list[float]]:
             break
         if 0.0 < FAR * float(rest.max()) <= extreme and np.unique(rest).size >= _DIFFERENT:
             return marked, found
-    return np.zeros(values.size, dtype=bool), []
+    return none, []
+
+
+def _is_repeated(values: np.ndarray) -> bool:
+    """Return True if the value farthest from 0 is there twice; most readings end here."""
+    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+    extreme = high if high >= -low else low
+    return int(np.count_nonzero(values == extreme)) >= _REPEATED or high == -low

@@ -377,8 +377,7 @@ def _step(chosen: Chosen, columns: Sequence[str], rate_Hz: float | None) -> floa
 
 def _place(source: Source, good: np.ndarray) -> Callable[[int], str]:
     """Return a function for the place in the file of one of the ``good`` rows."""
-    kept = np.flatnonzero(good)
-    return lambda at: source.row(int(kept[at]))
+    return lambda at: source.row(int(np.flatnonzero(good)[at]))
 
 
 def _unmarked(
@@ -429,7 +428,8 @@ def _good_rows(
         )
     seconds = table["time"]
     if not skip:
-        check_forward(seconds[good], names["time"], _place(source, good), source.path)
+        kept = seconds if good.all() else seconds[good]
+        check_forward(kept, names["time"], _place(source, good), source.path)
         return good
     latest = np.maximum.accumulate(np.where(good, seconds, -np.inf))
     good[1:] &= seconds[1:] > latest[:-1]

@@ -1,0 +1,78 @@
+"""Tables of the parameters of a diagnosis, with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from dearig.report.text.numbers import NO_VALUE, interval, quoted, symbol
+from dearig.report.text.tables import (
+    BOUND_MARK,
+    BRACKETS_TEXT,
+    BUDGET_HEAD,
+    Row,
+    Table,
+    budget_cells,
+    budget_text,
+)
+from dearig.units import parameter_unit
+
+if TYPE_CHECKING:
+    from dearig.analysis.outcomes import DiagnoseOutcome
+    from dearig.model.diagnosis.results import Stage
+    from dearig.model.fitting import Contribution, Estimate
+
+__all__ = ["effect_table", "estimate_table"]
+
+
+def effect_table(outcome: DiagnoseOutcome) -> Table:
+    """Return the parameters of the effects found, with intervals and meaning."""
+    from dearig.model.effects import EFFECTS
+
+    final, rows = outcome.finding.final, []
+    for step in outcome.finding.steps:
+        meanings = {p.name: p.meaning for p in EFFECTS[step.effect].parameters}
+        for e in step.estimates:
+            about = meanings.get(e.name.split(" in ")[0], "")  # may be a parameter of one recording
+            detail = "; ".join(w for w in (about, e.note) if w)
+            name = f"{step.effect}: {e.name.replace('_', ' ')}"
+            rows.append(_estimate(e, name, detail, bool(final.budget)))
+    shown = [e for step in outcome.finding.steps for e in step.estimates]
+    return _estimates("Fitted parameters", rows, shown, final.budget)
+
+
+def estimate_table(stage: Stage) -> Table:
+    """Return all parameters of a model."""
+    rows = [
+        _estimate(e, symbol(e.name).replace("_", " "), e.note, bool(stage.budget))
+        for e in stage.estimates
+    ]
+    return _estimates("Parameters", rows, stage.estimates, stage.budget)
+
+
+def _estimates(
+    title: str, rows: Sequence[Row], shown: Sequence[Estimate], budget: Sequence[Contribution]
+) -> Table:
+    head = [("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", "")]
+    notes = []
+    if budget and rows:
+        head += BUDGET_HEAD
+        notes.append(budget_text(budget))
+    if any(not e.determined for e in shown):
+        notes.append(BRACKETS_TEXT)
+    return Table(title, tuple(head), tuple(rows), " ".join(notes))
+
+
+def _estimate(e: Estimate, name: str, detail: str, with_budget: bool) -> Row:
+    factor, unit = parameter_unit(e.unit)
+    low, high = e.low * factor, e.high * factor
+    value = quoted(e.value * factor, *(end * factor for end in e.combined))
+    within = interval(low, high) if e.free else "derived"
+    if e.free and e.low == e.high == e.value:
+        within = NO_VALUE
+    if e.at_bound:
+        within += BOUND_MARK
+    cells = [name, value if e.determined else f"({value})", unit, within]
+    if with_budget:
+        cells += budget_cells(e, factor)
+    return Row(tuple(cells), detail, muted=not e.determined)

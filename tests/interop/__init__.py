@@ -1,0 +1,1 @@
+"""Files that real programs write, made by the programs themselves and imported."""

@@ -1,0 +1,33 @@
+"""Values of fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dearig.model.diagnosis.fits import Fit
+from dearig.model.film.material import Network
+from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.slow_noise import WhitenedProblem
+from tests.tools.engine import PLAIN, record_of
+
+
+def test_sorted_branches_are_the_same_fit_with_its_held_numbers() -> None:
+    network = Network.gent((8e4, 2e4, 4e4), (1e4, 50.0, 60.0), (3.0, 0.3))
+    layout = Layout(replace(PLAIN, network=network))
+    problem = WhitenedProblem([record_of(PLAIN)], layout, workers=1)
+    x = layout.coordinates(layout.initial())
+    held = np.array([name == "J_1" for name in layout.names])
+    residuals = problem.residuals(x)
+    columns = np.flatnonzero(~held) + np.zeros((residuals.size, 1))
+    fit = Fit(problem, x, held, 1.0, residuals, columns)
+    ordered = fit.by_relaxation_time()
+    assert ordered.model.network.times == pytest.approx((0.3, 3.0))
+    assert ordered.model.network.springs[1:] == tuple(reversed(fit.model.network.springs[1:]))
+    assert [n for n, h in zip(layout.names, ordered.fixed, strict=True) if h] == ["J_2"]
+    assert problem.residuals(ordered.x) == pytest.approx(residuals, abs=1e-6)
+    # each column of the Jacobian goes with its parameter
+    swapped = layout.order_by_relaxation_time(layout.values(x))[~ordered.fixed]
+    assert ordered.jacobian[0] == pytest.approx(swapped)
