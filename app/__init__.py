@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from dearig.api.analysis import diagnose, identify, simulate, validate
     from dearig.api.holding import HoldOptions, HoldResult, hold
-    from dearig.api.models import Model
+    from dearig.api.models import Model, export_model
     from dearig.api.predictions import Prediction
     from dearig.api.recordings import Recording, open, record  # noqa: A004
     from dearig.api.results import DiagnoseResult, IdentifyResult, ValidateResult
@@ -60,6 +60,7 @@ __all__ = [
     "ValidateResult",
     "__version__",
     "diagnose",
+    "export_model",
     "hold",
     "identify",
     "invert",
@@ -74,7 +75,7 @@ __all__ = [
 _MODULES = {
     "dearig.api.analysis": ("diagnose", "identify", "simulate", "validate"),
     "dearig.api.holding": ("HoldOptions", "HoldResult", "hold"),
-    "dearig.api.models": ("Model",),
+    "dearig.api.models": ("Model", "export_model"),
     "dearig.api.predictions": ("Prediction",),
     "dearig.api.recordings": ("Recording", "open", "record"),
     "dearig.api.results": ("DiagnoseResult", "IdentifyResult", "ValidateResult"),

@@ -21,7 +21,7 @@ from dearig.model import kernel
 from dearig.model.coefficients import AIR_HUMIDITY, AIR_TEMPERATURE, EFFECTS_AT
 from dearig.model.effects.description import Effect, Parameter, faults_of
 from dearig.model.effects.hooks import FASTEST, HOOKS
-from dearig.model.effects.registry import EFFECTS, PLACES, hook_faults
+from dearig.model.effects.registry import EFFECTS, ORIGINS, OURS, PLACES, hook_faults
 from dearig.model.errors import ModelError
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from dearig.model.simulation.actuator import Actuator, Drive, at_rest, reading_of
@@ -63,7 +63,8 @@ def faults_of_effect(name: str) -> list[str]:
     """Return what is wrong with the effect ``name``, in sentences; none if all is well."""
     if name not in EFFECTS:
         raise ModelError(f"effect {name!r} is not one of {', '.join(EFFECTS)}")
-    faults = [*faults_of(EFFECTS[name]), *hook_faults(PLACES[name].module)]
+    ours = ORIGINS[name] == OURS
+    faults = [*faults_of(EFFECTS[name], with_law=ours), *hook_faults(PLACES[name].module)]
     if not faults:
         probe = _Probe(name)
         for check in (_values, _pure, _stiffness, _joins, _rest, _supplies, _basis):

@@ -76,7 +76,7 @@ def plant_of(
     if case is not None and case.noise != WHITE:
         raise AddressError(
             f"rig {address!r} has {case.noise} noise, which only a rig without a server can have: "
-            f"write {cases.address_of(case.seed, case.hand)}"
+            f"write {cases.address_of(case.seed, case.generator)}"
         )
     return plant, None if case is None else case.seed
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 from dearig.config.rigfile import RigFile
 from dearig.drivers.registry import Registry
 from dearig.drivers.rig_kind import RigKind, RigOptions
 from dearig.errors import InputError
-from dearig.sim_backend.faults import FaultPlan
 
-__all__ = ["RIGS", "is_simulated", "kind_of", "options_of", "read_faults"]
+__all__ = ["RIGS", "is_simulated", "kind_of", "options_of"]
 
 
 def _check(name: str, kind: Any) -> None:
@@ -56,11 +54,3 @@ def is_simulated(address: str) -> bool:
 def options_of(rig_file: RigFile) -> RigOptions:
     """Return the options of a simulated rig with the film and the load of ``rig_file``."""
     return RigOptions(rig_file.as_film(), rig_file.as_load())
-
-
-def read_faults(faults: Iterable[str]) -> FaultPlan:
-    """Return the plan of ``faults`` such as ``arc@3.2``. Raises ``InputError``."""
-    try:
-        return FaultPlan.parse(list(faults))
-    except ValueError as error:
-        raise InputError(str(error)) from error

@@ -72,7 +72,7 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
     if options.actuator is not None and address != "sim":
         raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
     if not kind.simulated:
-        if options.faults is not None and options.faults.faults:
+        if options.fault_plan.faults:
             raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
         if not rig_file.film.name:
             raise InputError(
@@ -88,7 +88,7 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
         actuator=options.actuator,
         seed=options.seed,
         paced=options.paced,
-        faults=options.faults,
+        faults=options.fault_plan,
     )
     try:
         rig = kind.open(address, rig_file, wanted)
@@ -157,7 +157,7 @@ def record(
     rig = open_rig(address, rig_file, options)
     room = RoomOfRun(None, None)
     try:
-        room = open_room(address, rig_file, options.seed, options.faults)
+        room = open_room(address, rig_file, options.seed, options.fault_plan)
         room.check()
         if loop is not None and not getattr(rig, "plays_growing_waveforms", False):
             raise InputError(f"rig {address!r}: its driver cannot correct a run while it goes on")

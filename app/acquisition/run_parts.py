@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from dearig.acquisition.feedback import FeedbackReport
@@ -11,6 +12,7 @@ from dearig.acquisition.plan import Plan
 from dearig.drivers.gate import Margin
 from dearig.drivers.instruments.thermohygrometer import RoomReading
 from dearig.drivers.rig import Block, Event, RigIdentity
+from dearig.errors import InputError
 from dearig.model.control import HoldAnswer
 from dearig.model.simulation.actuator import Actuator
 from dearig.output_state import OutputState
@@ -31,7 +33,8 @@ class RunOptions:
     file came from.
 
     Only for a simulated rig: ``seed`` of its noise, ``paced`` for real time, ``actuator`` in place
-    of the film that ``sim`` has by default, and the ``faults`` that occur in it.
+    of the film that ``sim`` has by default, and the ``faults`` that occur in it, such as
+    ``arc@3.2``. Raises ``InputError`` if one cannot be read.
     """
 
     configuration: str = ""
@@ -44,8 +47,21 @@ class RunOptions:
     seed: int = 0
     paced: bool = False
     actuator: Actuator | None = None
-    faults: FaultPlan | None = None
+    faults: Iterable[str] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Read the faults now, before anything is opened; an iterator is read once."""
+        object.__setattr__(self, "faults", tuple(self.faults))
+        _ = self.fault_plan
+
+    @cached_property
+    def fault_plan(self) -> FaultPlan:
+        """The plan of ``faults``."""
+        try:
+            return FaultPlan.parse(self.faults)
+        except ValueError as error:
+            raise InputError(str(error)) from error
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, STOPPED, Judgem
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
     from dearig.config.modelfile import ModelFile
-    from dearig.model.diagnosis.events import Event
+    from dearig.model.diagnosis.events import OneTimeEvent
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Contribution, Identification
     from dearig.model.readings.measures import Errors
@@ -86,7 +86,7 @@ class Comparison:
     published: Published | None = None
     warnings: tuple[str, ...] = field(default=())
     rms_without_events: float | None = None
-    events: tuple[Event, ...] = ()
+    events: tuple[OneTimeEvent, ...] = ()
     ended: EarlyEnd | None = None
     quiet_count: int = 0
     origin: Origin | None = None
@@ -345,8 +345,20 @@ class DiagnoseOutcome:
         Where it does not confirm what was found, the part of the error above the noise that is left
         on untouched recordings is of no known family.
         """
+        return self._confirmed(self.finding.families)
+
+    @property
+    def marginals(self) -> dict[str, float]:
+        """The probability of each family that it is among what is missing, as of ``families``.
+
+        Empty where the search did not say.
+        """
+        known = self.finding.marginals
+        return dict(self._confirmed(known)) if known else {}
+
+    def _confirmed(self, families: tuple[tuple[str, float], ...]) -> tuple[tuple[str, float], ...]:
         if self.verdict != NOT_CONFIRMED:
-            return self.finding.families
+            return families
         left = 1.0
         if self.recommends_final:
             above = [
@@ -354,7 +366,7 @@ class DiagnoseOutcome:
                 for some in ([pair[i] for pair in self._comparable] for i in (0, 1))
             ]
             left = above[1] / above[0] if above[0] > 0.0 else 1.0
-        found = {family: p * (1.0 - left) for family, p in self.finding.families}
+        found = {family: p * (1.0 - left) for family, p in families}
         found["unknown"] = found.get("unknown", 0.0) + left
         return tuple(sorted(found.items(), key=lambda item: -item[1]))
 

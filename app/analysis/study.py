@@ -29,11 +29,11 @@ from dearig.progress import Progress, quiet
 from dearig.recording.reading.recording import Recording
 from dearig.recording.result_folder import numbered_folder
 
-__all__ = ["Residual", "Study", "Task", "Trace", "study"]
+__all__ = ["Residual", "Study", "StudyRequest", "Trace", "study"]
 
 
 @dataclass(frozen=True)
-class Task:
+class StudyRequest:
     """Settings of a study.
 
     ``diagnose`` or else identify, with Maxwell ``branches``, a ``spring`` (for identify) and
@@ -86,7 +86,7 @@ class Residual:
 class Study:
     """Result of a task: outcome, residuals of the recordings, and the files written."""
 
-    task: Task
+    task: StudyRequest
     outcome: IdentifyOutcome | DiagnoseOutcome
     residuals: tuple[Residual, ...]
     model: Path
@@ -94,7 +94,7 @@ class Study:
 
 
 def study(
-    task: Task,
+    task: StudyRequest,
     folder: Path,
     write_report: Callable[[IdentifyOutcome | DiagnoseOutcome, Path], object],
     *,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dearig.acquisition.rigs import read_faults
 from dearig.acquisition.run import RunOptions
 from dearig.analysis import hold as holding
 from dearig.analysis.hold import HoldOptions
@@ -201,7 +200,7 @@ def hold(
         displacement_mm * 1e-3, seconds, read_model(model), rig, settings, Path(out),
         RunOptions(
             text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
-            faults=read_faults(faults), provenance=rig_provenance(rig_file),
+            faults=faults, provenance=rig_provenance(rig_file),
         ),
         options, feedback=feedback, progress=progress,
     )  # fmt: skip

@@ -10,11 +10,12 @@ from dearig.api.display import card, facts, table_html
 from dearig.config.modelfile import ModelFile, load_model, model_toml, save_model
 from dearig.model.film.material import Spring
 from dearig.model.simulation.actuator import Actuator
+from dearig.report.model_export.write import write_export
 from dearig.report.text.numbers import NO_VALUE, significant
 from dearig.report.text.sentences import describe_model
 from dearig.report.text.tables import Row, Table
 
-__all__ = ["Model", "ModelSource", "as_model_file", "read_model"]
+__all__ = ["Model", "ModelSource", "as_model_file", "export_model", "read_model"]
 
 
 class Model(ModelFile):
@@ -205,3 +206,33 @@ def read_model(source: ModelSource) -> ModelFile:
     """
     given = as_model_file(source)
     return given if isinstance(given, ModelFile) else load_model(given)
+
+
+def export_model(model: ModelSource, to: str, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a model for another program.
+
+    Parameters
+    ----------
+    model : model, result or path
+        A ``Model``, a result that has one, or the path of a model file.
+    to : str
+        ``"latex"``: a page of equations with numbers. ``"python"``: one file with a function
+        ``simulate``, which needs NumPy alone. ``"prony"``: strain energy and Prony series for
+        finite-element programs, with what they cannot express.
+    path : str or Path
+        The file.
+    overwrite : bool
+        Replace a file that exists.
+
+    Returns
+    -------
+    Path
+        The path that was written.
+
+    Raises
+    ------
+    InputError
+        If ``to`` is another word, the model cannot be read, or the file exists or cannot be
+        written.
+    """
+    return write_export(read_model(model), to, path, overwrite)

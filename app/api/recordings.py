@@ -15,7 +15,6 @@ import tomli_w
 
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rig_source import SOURCE, source_of
-from dearig.acquisition.rigs import read_faults
 from dearig.acquisition.run import RunOptions
 from dearig.acquisition.run import record as run
 from dearig.analysis.readings.compatibility import of_rig
@@ -278,7 +277,7 @@ def record(
     in_step = None if overlay is None else _overlay_model(overlay)
     options = RunOptions(
         text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
-        actuator=actuator, faults=read_faults(faults), provenance=rig_provenance(rig_file),
+        actuator=actuator, faults=faults, provenance=rig_provenance(rig_file),
     )  # fmt: skip
     folder = None if path is not None else Path(tempfile.mkdtemp(prefix="dearig-"))
     out = Path(path) if path is not None else _unnamed(folder, sequence, loaded)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dearig.acquisition.rigs import read_faults
 from dearig.acquisition.run import RunOptions
 from dearig.analysis.track import track as follow
 from dearig.analysis.track_target import plan_target
@@ -408,7 +407,7 @@ def track(
         _target(target), read_model(model), rig, settings, Path(out),
         RunOptions(
             text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
-            faults=read_faults(faults), provenance=rig_provenance(rig_file),
+            faults=faults, provenance=rig_provenance(rig_file),
         ),
         iterations=iterations, compare=None if compare is None else read_model(compare),
         nearest=nearest, within=within_um * 1e-6, progress=progress,

@@ -31,7 +31,7 @@ from dearig.recording.files import in_words, journal_of, one_line
 
 # a worker process imports this module before it knows its task
 if TYPE_CHECKING:
-    from dearig.batch.fits import Row, Task
+    from dearig.batch.fits import FitTask, Row
 
 __all__ = ["ClusterLost", "DaskEngine", "Engine", "LocalEngine", "engine_at"]
 
@@ -56,12 +56,12 @@ class ClusterLost(Exception):  # noqa: N818  (what happened)
 class Engine(Protocol):
     """A place where tasks are computed."""
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Row]]:
+    def run(self, tasks: Sequence[FitTask]) -> Iterator[tuple[FitTask, Row]]:
         """Yield each task with its row, in the order in which they end."""
 
 
 def engine_at(
-    where: str, workers: int | None = None, work: Callable[[Task], Row] | None = None
+    where: str, workers: int | None = None, work: Callable[[FitTask], Row] | None = None
 ) -> Engine:
     """Return the engine that ``where`` names: local, or dask:ADDRESS. Raises ``InputError``.
 
@@ -86,12 +86,12 @@ class LocalEngine:
     """
 
     def __init__(
-        self, workers: int | None = None, work: Callable[[Task], Row] | None = None
+        self, workers: int | None = None, work: Callable[[FitTask], Row] | None = None
     ) -> None:
         self.workers = workers or os.cpu_count() or 1
         self._work = work or _fit_task()
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Row]]:
+    def run(self, tasks: Sequence[FitTask]) -> Iterator[tuple[FitTask, Row]]:
         """Yield each task with its row, in the order in which they end."""
         if self.workers == 1 or len(tasks) == 1:
             for task in tasks:
@@ -103,9 +103,9 @@ class LocalEngine:
             for task in suspects:
                 yield task, self._alone(task)
 
-    def _alone(self, task: Task) -> Row:
+    def _alone(self, task: FitTask) -> Row:
         """Compute a task that was under way when a worker died: it may be the cause."""
-        found: list[tuple[Task, Row]] = []
+        found: list[tuple[FitTask, Row]] = []
         for _ in range(_TRIES_ALONE):
             found += self._pool(deque([task]), 1)
             if found:
@@ -113,8 +113,8 @@ class LocalEngine:
         return _lost(task)
 
     def _pool(
-        self, waiting: deque[Task], workers: int
-    ) -> Generator[tuple[Task, Row], None, list[Task]]:
+        self, waiting: deque[FitTask], workers: int
+    ) -> Generator[tuple[FitTask, Row], None, list[FitTask]]:
         """Compute tasks of ``waiting`` until there are none, or a worker dies.
 
         Returns the tasks that were under way then. A task is handed over when a worker is free for
@@ -124,7 +124,7 @@ class LocalEngine:
         pool = ProcessPoolExecutor(
             workers, multiprocessing.get_context("spawn"), initializer=_begin_worker
         )
-        running: dict[Future[Row], Task] = {}
+        running: dict[Future[Row], FitTask] = {}
         try:
             while waiting or running:
                 while waiting and len(running) < workers:
@@ -155,7 +155,7 @@ def _words(error: BaseException) -> str:
     )
 
 
-def _fit_task() -> Callable[[Task], Row]:
+def _fit_task() -> Callable[[FitTask], Row]:
     from dearig.batch.fits import fit_task
 
     return fit_task
@@ -175,7 +175,7 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _lost(task: Task) -> Row:
+def _lost(task: FitTask) -> Row:
     return {
         "recording": task.name,
         "state": "failed",
@@ -192,7 +192,7 @@ class DaskEngine:
     Raises ``InputError`` where Dask is not installed, or no scheduler answers.
     """
 
-    def __init__(self, address: str, work: Callable[[Task], Row] | None = None) -> None:
+    def __init__(self, address: str, work: Callable[[FitTask], Row] | None = None) -> None:
         self._work = work or _fit_task()
         self._dask = import_extra("distributed", "cluster", "a study at dask:ADDRESS")
         self._address = address
@@ -206,7 +206,7 @@ class DaskEngine:
                 f"no Dask scheduler answers at {self._address}: {in_words(error)}"
             ) from error
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Row]]:
+    def run(self, tasks: Sequence[FitTask]) -> Iterator[tuple[FitTask, Row]]:
         """Yield each task with its row, in the order in which they end.
 
         Raises ``ClusterLost`` where the scheduler, all workers or the network are lost.
@@ -223,10 +223,12 @@ class DaskEngine:
             # two for each thread: one is computed while the next one is on its way
             yield from self._run(client, deque(tasks), 2 * threads)
 
-    def _run(self, client: Any, waiting: deque[Task], most: int) -> Iterator[tuple[Task, Row]]:
+    def _run(
+        self, client: Any, waiting: deque[FitTask], most: int
+    ) -> Iterator[tuple[FitTask, Row]]:
         from dearig.batch.fits import OtherVersion
 
-        running: dict[Any, Task] = {}
+        running: dict[Any, FitTask] = {}
         while waiting or running:
             while waiting and len(running) < most:
                 task = waiting.popleft()
@@ -263,7 +265,7 @@ class DaskEngine:
                 return ended
         raise ClusterLost(f"it has had no worker for {_NO_WORKER_S:g} s")
 
-    def _submit(self, client: Any, task: Task) -> Any:
+    def _submit(self, client: Any, task: FitTask) -> Any:
         from dearig.batch.fits import code_digest, fit_sent
 
         sent = [

@@ -37,11 +37,11 @@ from dearig.recording.reading.recording import Recording
 
 __all__ = [
     "KINDS",
+    "FitTask",
     "OtherVersion",
     "Row",
     "StudyOptions",
     "Subject",
-    "Task",
     "about",
     "code_digest",
     "fit_sent",
@@ -99,7 +99,7 @@ class StudyOptions:
 
 
 @dataclass(frozen=True)
-class Task:
+class FitTask:
     """One recording of a study: its ``name`` in the table, its file, and the key of its row.
 
     ``members`` are names and files of the recordings of the film ``name`` that are fitted together.
@@ -144,7 +144,7 @@ def key_of(path: Path, name: str, options: StudyOptions) -> str:
     return found.hexdigest()
 
 
-def fit_task(task: Task, progress: Progress = quiet) -> Row:
+def fit_task(task: FitTask, progress: Progress = quiet) -> Row:
     """Return the row of ``task``; what is wrong with its recording is in the row."""
     name, path = task.name, task.path
     row: Row = {"recording": name, "state": "failed", "reason": ""}
@@ -165,7 +165,7 @@ def fit_task(task: Task, progress: Progress = quiet) -> Row:
 
 
 def fit_sent(
-    work: Callable[[Task], Row],
+    work: Callable[[FitTask], Row],
     task: tuple[str, str, StudyOptions],
     sent: Sequence[tuple[str, Sequence[tuple[str, bytes]]]],
     digest: str,
@@ -187,7 +187,7 @@ def fit_sent(
             for file, content in files:
                 (place / file).write_bytes(content)
             members.append((recording, place / files[0][0]))
-        return work(Task(name, members[0][1], key, options, tuple(members)))
+        return work(FitTask(name, members[0][1], key, options, tuple(members)))
 
 
 def about(recording: Recording) -> Row:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from dearig.batch.trend import Trend
 from dearig.batch.trend_columns import Design
 
-__all__ = ["Proposal", "proposals"]
+__all__ = ["NextExperiment", "proposals"]
 
 #: Films from which their scatter is known within a factor of two, with a probability of 91 %: the
 #: chi-square with 4 degrees of freedom is between 4/2^2 and 4 2^2.
@@ -17,7 +17,7 @@ _FILMS_MIN = 5
 
 
 @dataclass(frozen=True)
-class Proposal:
+class NextExperiment:
     """What to vary: ``kind`` is vary, separate, record, films, repeat or narrow; and why.
 
     ``number`` is the column of the table that the sentence names, "" where it names none.
@@ -29,26 +29,28 @@ class Proposal:
     number: str = ""
 
 
-def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Proposal, ...]:
+def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[NextExperiment, ...]:
     """Return what to vary next, the most useful first.
 
     First what shows no effect because it was not varied or not recorded, then what cannot be told
     apart, then films that are few or differ, and last the effect that is known least.
     """
     found = [
-        Proposal("record", (label,), f"Record the {label}: fewer than half of the runs have it.")
+        NextExperiment(
+            "record", (label,), f"Record the {label}: fewer than half of the runs have it."
+        )
         for label in design.missing
     ]
     for sentence in design.left_out:
         label, _, why = sentence.partition(": ")
         if label not in design.missing:
             kind = "vary" if label in design.constant else "separate"
-            found.append(Proposal(kind, (label,), f"{kind.capitalize()} the {label}: {why}"))
+            found.append(NextExperiment(kind, (label,), f"{kind.capitalize()} the {label}: {why}"))
     for column in design.columns:
         low, high = column.range
         if high - low < column.hardly:
             found.append(
-                Proposal(
+                NextExperiment(
                     "vary",
                     (column.label,),
                     f"Vary the {column.label} by {column.hardly:g} {column.unit} and more: it was "
@@ -58,7 +60,7 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Prop
     for a, b, r in design.entangled:
         wider = 1.0 / math.sqrt(max(1.0 - r * r, 1e-6))
         found.append(
-            Proposal(
+            NextExperiment(
                 "separate",
                 (a, b),
                 f"Vary {a} and {b} independently of each other: their correlation is {r:.2f}, so "
@@ -67,7 +69,7 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Prop
         )
     if films < _FILMS_MIN:
         found.append(
-            Proposal(
+            NextExperiment(
                 "films",
                 ("film",),
                 f"Measure more films: with {films}, the scatter between films is hardly known; "
@@ -79,7 +81,7 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Prop
             if effect.verdict == "one_film":
                 film = effect.own[0].film
                 found.append(
-                    Proposal(
+                    NextExperiment(
                         "repeat",
                         (effect.column.label,),
                         f"Repeat film {film} over its range of {effect.column.label}: its "
@@ -90,7 +92,7 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Prop
     return (*found, *_least_known(trends))
 
 
-def _least_known(trends: Sequence[Trend]) -> list[Proposal]:
+def _least_known(trends: Sequence[Trend]) -> list[NextExperiment]:
     """Return the effect that is seen by itself only, whose interval is widest for its size."""
     wide = [
         (0.5 * (effect.high - effect.low) / abs(effect.slope), trend.name, effect.column)
@@ -104,7 +106,7 @@ def _least_known(trends: Sequence[Trend]) -> list[Proposal]:
     part, name, column = max(wide, key=lambda each: each[0])
     low, high = column.range
     return [
-        Proposal(
+        NextExperiment(
             "narrow",
             (column.label,),
             f"Repeat runs at both ends of {column.label} ({low:.4g} and {high:.4g} "

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dearig.analysis.shared import identify_shared
 from dearig.batch.fits import (
     ONE_AT_A_TIME,
+    FitTask,
     Row,
     StudyOptions,
     Subject,
-    Task,
     about,
     parameter_columns,
 )
@@ -28,15 +28,15 @@ __all__ = ["film_task", "fit_film", "rows_of"]
 log = logging.getLogger(__name__)
 
 
-def film_task(film: str, members: Sequence[tuple[Subject, str]], options: StudyOptions) -> Task:
+def film_task(film: str, members: Sequence[tuple[Subject, str]], options: StudyOptions) -> FitTask:
     """Return the task of ``film``; ``members`` are its recordings with the keys of their rows."""
     ordered = sorted(members, key=lambda member: member[0].name)
     digest = hashlib.sha256("\n".join(key for _, key in ordered).encode()).hexdigest()
     named = tuple((subject.name, subject.path) for subject, _ in ordered)
-    return Task(film, named[0][1], digest, options, named)
+    return FitTask(film, named[0][1], digest, options, named)
 
 
-def fit_film(task: Task, progress: Progress = quiet) -> Row:
+def fit_film(task: FitTask, progress: Progress = quiet) -> Row:
     """Return the ``rows`` of a film's recordings; one that cannot be read has no result.
 
     Where the others cannot be fitted together either, no recording has a result.
@@ -97,7 +97,7 @@ def _fit(
         }
 
 
-def rows_of(task: Task, found: Row) -> dict[str, Row]:
+def rows_of(task: FitTask, found: Row) -> dict[str, Row]:
     """Return the rows of the recordings of ``task`` by their names, from what it gave."""
     if "rows" not in found:
         # its process died

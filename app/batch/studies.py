@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dearig.batch.engines import ClusterLost, Engine, LocalEngine
-from dearig.batch.fits import KINDS, Row, StudyOptions, Subject, Task, fit_task, key_of
+from dearig.batch.fits import KINDS, FitTask, Row, StudyOptions, Subject, fit_task, key_of
 from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import Queue
 from dearig.batch.shared_fits import film_task, fit_film, rows_of
@@ -161,12 +161,12 @@ def study_recordings(
     """
     cache = _cache_in(out)
     rows: dict[str, Row] = {}
-    tasks: list[Task] = []
+    tasks: list[FitTask] = []
     unreadable = 0
     for i, subject in enumerate(subjects):
         progress("reading", i / len(subjects))
         try:
-            task = Task(
+            task = FitTask(
                 subject.name, subject.path, key_of(subject.path, subject.name, options), options
             )
         except OSError as error:
@@ -259,9 +259,9 @@ def _unreadable(subject: Subject, error: OSError) -> Row:
 
 
 def _compute_all(
-    tasks: Sequence[Task],
+    tasks: Sequence[FitTask],
     engine: Engine,
-    work: Callable[[Task], Row],
+    work: Callable[[FitTask], Row],
     rows: dict[str, Row],
     cache: Path,
     total: int,
@@ -280,7 +280,7 @@ def _compute_all(
 
 
 def _compute(
-    tasks: Sequence[Task],
+    tasks: Sequence[FitTask],
     engine: Engine,
     rows: dict[str, Row],
     cache: Path,

@@ -9,9 +9,9 @@ import numpy as np
 
 from dearig.batch.film_effects import Explained
 from dearig.batch.mixed_model import LinearFit
-from dearig.batch.trend_columns import Column, Design
+from dearig.batch.trend_columns import Covariate, Design
 
-__all__ = ["VERDICTS", "Change", "Curve", "Effect", "FilmSlope", "Trend"]
+__all__ = ["VERDICTS", "ChangePoint", "FilmSlope", "Trend", "TrendCurve", "TrendSlope"]
 
 #: Verdicts on an effect as a table shows them, by their keys.
 VERDICTS = {
@@ -35,7 +35,7 @@ class FilmSlope:
 
 
 @dataclass(frozen=True)
-class Effect:
+class TrendSlope:
     """Effect of a column on a number: ``slope`` per unit of the column, with its 95 % interval.
 
     ``simultaneous`` is the interval that holds the truth together with those of all other effects
@@ -45,7 +45,7 @@ class Effect:
     ``VERDICTS``; with "one_film" the slope is that of the other films.
     """
 
-    column: Column
+    column: Covariate
     slope: float
     low: float
     high: float
@@ -57,7 +57,7 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class Change:
+class ChangePoint:
     """Jump of a number of one film: between the recordings ``last`` and ``first``.
 
     ``size`` is in percent on a logarithmic scale, else in the number's unit, after the effects of
@@ -75,7 +75,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Curve:
+class TrendCurve:
     """Number (m,) over ``x`` (m,) of one column, the others at their means, with its 95 % band."""
 
     x: np.ndarray
@@ -99,8 +99,8 @@ class Trend:
     high: np.ndarray
     design: Design
     model: Explained
-    effects: tuple[Effect, ...]
-    changes: tuple[Change, ...]
+    effects: tuple[TrendSlope, ...]
+    changes: tuple[ChangePoint, ...]
 
     @property
     def relative(self) -> bool:
@@ -125,7 +125,7 @@ class Trend:
         """The number where all columns are at their means, in its unit."""
         return float(self.natural(np.array(self.fit.intercept)))
 
-    def curve(self, i: int, points: int = 60) -> Curve:
+    def curve(self, i: int, points: int = 60) -> TrendCurve:
         """Return the number over column ``i``, the others at their means."""
         x = np.linspace(*self.design.columns[i].range, points)
         shifted = x - self.fit.centre[i]
@@ -133,7 +133,7 @@ class Trend:
         c = self.fit.covariance
         variance = c[0, 0] + 2.0 * shifted * c[0, 1 + i] + shifted**2 * c[1 + i, 1 + i]
         half = self.fit.quantile(i) * np.sqrt(np.maximum(variance, 0.0))
-        return Curve(x, self.natural(y), self.natural(y - half), self.natural(y + half))
+        return TrendCurve(x, self.natural(y), self.natural(y - half), self.natural(y + half))
 
     def adjusted(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Return column ``i`` (n,) and the number (n,) less film and the other columns' effects."""

@@ -19,7 +19,7 @@ from dearig.recording.content.fields import CONDITIONS
 
 __all__ = [
     "FREEDOM_MIN",
-    "Column",
+    "Covariate",
     "Design",
     "columns_in",
     "days_of_films",
@@ -45,7 +45,7 @@ _TIMES = (("days", "day", 1.0), ("hours", "h", 24.0), ("minutes", "min", 1440.0)
 
 
 @dataclass(frozen=True)
-class Column:
+class Covariate:
     """A column that may change the numbers: ``values`` (n,) of all rows, NaN where not known.
 
     Slopes are given per ``unit``. A range smaller than ``hardly`` counts as hardly varied.
@@ -71,7 +71,7 @@ class Design:
     because all runs have the same value.
     """
 
-    columns: tuple[Column, ...]
+    columns: tuple[Covariate, ...]
     left_out: tuple[str, ...]
     entangled: tuple[tuple[str, str, float], ...]
     missing: tuple[str, ...]
@@ -85,7 +85,7 @@ def films_in(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def columns_in(
     rows: Sequence[Mapping[str, Any]], films: Sequence[str], against: Sequence[str] = ()
-) -> list[Column]:
+) -> list[Covariate]:
     """Return the columns of ``rows`` by which their numbers may change, in order of interest.
 
     ``against`` names columns of the table to use in place of all these. Raises ``InputError`` for
@@ -94,35 +94,35 @@ def columns_in(
     if against:
         return [_named(rows, name) for name in against]
     found = [
-        Column(c.short or c.label, c.slope_unit or c.unit, _numbers(rows, name), c.tight)
+        Covariate(c.short or c.label, c.slope_unit or c.unit, _numbers(rows, name), c.tight)
         for name, c in CONDITIONS.items()
         if any(row.get(name) is not None for row in rows)
     ]
     days = days_of_films(rows, films)
     order = np.argsort(np.where(np.isfinite(days), days, np.inf), kind="stable")
     if any(row.get(_CYCLES) is not None for row in rows):
-        found.append(Column("cycles", "1000 cycles", _cycles_before(rows, films, order) / 1e3))
+        found.append(Covariate("cycles", "1000 cycles", _cycles_before(rows, films, order) / 1e3))
     if np.isfinite(days).any():
         found.append(_time_column(days))
     settings = [n for n in dict.fromkeys(n for row in rows for n in row) if n.startswith("set ")]
     for name in settings:
         values = _numbers(rows, name)
         if np.isfinite(values).any():
-            found.append(Column(name.removeprefix("set "), "", values))
+            found.append(Covariate(name.removeprefix("set "), "", values))
     return found + _rigs(rows, films)
 
 
-def _time_column(days: np.ndarray) -> Column:
+def _time_column(days: np.ndarray) -> Covariate:
     """Return the column of the time, in the largest unit that the runs span.
 
     A slope per day of runs within minutes would be an extrapolation far beyond them.
     """
     span = float(np.nanmax(days) - np.nanmin(days))
     unit = next((u for u in _TIMES if span * u[2] >= 1.0), _TIMES[-1])
-    return Column(unit[0], unit[1], days * unit[2])
+    return Covariate(unit[0], unit[1], days * unit[2])
 
 
-def _named(rows: Sequence[Mapping[str, Any]], name: str) -> Column:
+def _named(rows: Sequence[Mapping[str, Any]], name: str) -> Covariate:
     values = _numbers(rows, name)
     if not np.isfinite(values).any():
         known = sorted({n for row in rows for n in row})
@@ -130,7 +130,7 @@ def _named(rows: Sequence[Mapping[str, Any]], name: str) -> Column:
             f"column {name!r} is not in the table, or has no numbers; its columns are "
             f"{', '.join(known[:40])}"
         )
-    return Column(name, "", values)
+    return Covariate(name, "", values)
 
 
 def _numbers(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
@@ -171,7 +171,7 @@ def _cycles_before(
     return before
 
 
-def _rigs(rows: Sequence[Mapping[str, Any]], films: Sequence[str]) -> list[Column]:
+def _rigs(rows: Sequence[Mapping[str, Any]], films: Sequence[str]) -> list[Covariate]:
     """Return a column of zeros and ones for each rig but the first.
 
     There are none where each film was on one rig, and the films are too few to tell them from rigs.
@@ -182,17 +182,19 @@ def _rigs(rows: Sequence[Mapping[str, Any]], films: Sequence[str]) -> list[Colum
     if not 1 < len(rigs) <= _RIGS_MAX or (is_of_films and len(each) - len(rigs) < FREEDOM_MIN):
         return []
     return [
-        Column(f"rig {rig} in place of {rigs[0]}", "", np.array([n == rig for n in names], float))
+        Covariate(
+            f"rig {rig} in place of {rigs[0]}", "", np.array([n == rig for n in names], float)
+        )
         for rig in rigs[1:]
     ]
 
 
-def design_of(columns: Sequence[Column], used: np.ndarray) -> Design:
+def design_of(columns: Sequence[Covariate], used: np.ndarray) -> Design:
     """Return the columns that can be estimated together on the rows ``used`` (n,) bool.
 
     A column that is constant, or that follows from those before it, is left out.
     """
-    kept: list[Column] = []
+    kept: list[Covariate] = []
     left_out: list[str] = []
     missing: list[str] = []
     constant: list[str] = []

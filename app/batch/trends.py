@@ -20,12 +20,12 @@ from scipy.stats import norm
 from dearig.analysis.cores import for_simulations
 from dearig.batch.film_effects import DIFFER, Explained, explain
 from dearig.batch.mixed_model import Sample, fit_linear, slopes_differ
-from dearig.batch.next_experiment import Proposal, proposals
+from dearig.batch.next_experiment import NextExperiment, proposals
 from dearig.batch.table_file import write_csv, write_parquet
-from dearig.batch.trend import Change, Effect, FilmSlope, Trend
+from dearig.batch.trend import ChangePoint, FilmSlope, Trend, TrendSlope
 from dearig.batch.trend_columns import (
     FREEDOM_MIN,
-    Column,
+    Covariate,
     columns_in,
     days_of_films,
     design_of,
@@ -60,7 +60,7 @@ class Trends:
     failed: int
     trends: tuple[Trend, ...]
     left_out: tuple[str, ...]
-    proposals: tuple[Proposal, ...]
+    proposals: tuple[NextExperiment, ...]
     days: np.ndarray
 
     @property
@@ -207,7 +207,7 @@ def find_trends(
 def _trend(
     rows: Sequence[Mapping[str, Any]],
     films: Sequence[str],
-    columns: Sequence[Column],
+    columns: Sequence[Covariate],
     name: str,
     told: list[str],
 ) -> Trend | None:
@@ -295,7 +295,7 @@ def _with_effects(trend: Trend, each: float) -> Trend:
     return replace(trend, effects=effects)
 
 
-def _effect(model: Explained, column: Column, i: int, each: float) -> Effect:
+def _effect(model: Explained, column: Covariate, i: int, each: float) -> TrendSlope:
     """Return the effect of ``column``, of place ``i``, and which films have another one.
 
     ``each`` is the confidence of its simultaneous interval.
@@ -314,7 +314,7 @@ def _effect(model: Explained, column: Column, i: int, each: float) -> Effect:
         verdict = "none"
     own = tuple(_own_slope(model, i, place) for place in places)
     wide = fit.interval(i, each)
-    return Effect(
+    return TrendSlope(
         column, told(slope), told(low), told(high), (told(wide[0]), told(wide[1])),
         float(fit.p_values[i]), p_equal, verdict, own,
     )  # fmt: skip
@@ -357,7 +357,9 @@ def _judged(trends: Sequence[Trend]) -> list[Trend]:
     ]
 
 
-def _changes(rows: Sequence[Mapping[str, Any]], at: np.ndarray, model: Explained) -> list[Change]:
+def _changes(
+    rows: Sequence[Mapping[str, Any]], at: np.ndarray, model: Explained
+) -> list[ChangePoint]:
     """Return the jumps of each film; ``at`` (n,) are the rows of the sample."""
     found = []
     for place, extra in enumerate(model.extras, start=model.columns):
@@ -368,7 +370,7 @@ def _changes(rows: Sequence[Mapping[str, Any]], at: np.ndarray, model: Explained
         low, high = model.fit.interval(place)
         size = float(model.fit.slopes[place])
         found.append(
-            Change(
+            ChangePoint(
                 model.films[extra.film], str(rows[before]["recording"]),
                 str(rows[after]["recording"]), str(rows[after].get("started") or ""),
                 model.told(size), model.told(low), model.told(high), after,

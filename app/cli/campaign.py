@@ -123,7 +123,6 @@ def campaign(
     Ctrl-C ramps the voltage down to 0 V and ends the campaign; --resume continues it.
     """  # fmt: skip
     from dearig.acquisition.rig_source import SOURCE
-    from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.readings.compatibility import of_rig
     from dearig.batch.campaign import Arming, play_campaign
@@ -152,10 +151,9 @@ def campaign(
         print_lines(console, forecast_texts(loaded, found))
         write_result(forecast_json(loaded, found), json)
         return
-    faults = read_faults(fault or ())
     options = RunOptions(
         text, operator, film, notes, fsync=fsync, seed=seed, paced=paced, actuator=actuator,
-        faults=faults, provenance=provenance,
+        faults=fault or (), provenance=provenance,
     )  # fmt: skip
     with working(json) as (console, progress):
         announce_rig(console, rig, settings, provenance[SOURCE])

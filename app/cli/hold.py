@@ -105,7 +105,6 @@ def hold(
     is output. Ctrl-C ramps the voltage down to 0 V and keeps what was recorded.
     """
     from dearig.acquisition.rig_source import SOURCE, film_differences
-    from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.hold import HoldOptions, actuator_of, check_hold, plan_hold
     from dearig.analysis.hold import hold as run
@@ -116,9 +115,8 @@ def hold(
     written = () if out is None else (out,)
     check_files(force, (model, rig_file), *written, json=json, recording=out)
     (settings, text, provenance), ours = rig_settings(rig_file), load_model(model)
-    faults = read_faults(fault or ())
     run_options = RunOptions(
-        text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=faults,
+        text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=fault or (),
         provenance=provenance,
     )  # fmt: skip
     options = HoldOptions(

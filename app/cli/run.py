@@ -118,7 +118,7 @@ def record(
     """
     from dearig.acquisition.overlay import OverlayModel
     from dearig.acquisition.rig_source import SOURCE
-    from dearig.acquisition.rigs import kind_of, read_faults
+    from dearig.acquisition.rigs import kind_of
     from dearig.acquisition.run import RunOptions
     from dearig.acquisition.run import record as run
     from dearig.analysis.readings.compatibility import of_rig
@@ -153,7 +153,6 @@ def record(
         settings = of_rig(settings, actuator.film, actuator.load)
     if original is not None and simulated:
         original.check_film(settings)
-    faults = read_faults(fault or ())
     overlaid = None
     if overlay is not None:
         overlaid = OverlayModel(
@@ -161,7 +160,7 @@ def record(
         )
     options = RunOptions(
         text, operator, film, notes, overwrite=force, fsync=fsync,
-        seed=seed, paced=paced, actuator=actuator, faults=faults, provenance=provenance,
+        seed=seed, paced=paced, actuator=actuator, faults=fault or (), provenance=provenance,
     )  # fmt: skip
     notifier = Notifier(notify_from(notify_command, notify_webhook, notify_on, Notify()))
     with working(json) as (console, progress):

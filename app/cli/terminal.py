@@ -15,6 +15,7 @@ from dearig.printable import printable
 from dearig.report.text.diagnosis import (
     before_after_table,
     experiment_table,
+    family_label,
     headline,
     rankings,
     step_table,
@@ -23,6 +24,7 @@ from dearig.report.text.diagnosis import (
     warnings,
 )
 from dearig.report.text.estimates import effect_table
+from dearig.report.text.laws import bounds_table, effect_named, law_lines
 from dearig.report.text.numbers import to_ascii
 from dearig.report.text.sentences import identify_summary, listed, validate_summary, warnings_of
 from dearig.report.text.tables import (
@@ -47,12 +49,14 @@ if TYPE_CHECKING:
     from dearig.batch.queue import CampaignOutcome
     from dearig.batch.studies import StudyTable
     from dearig.batch.trends import Trends
+    from dearig.model.effects import Effect
 
 __all__ = [
     "branch_table",
     "campaign_runs",
     "diagnosis_tables",
     "identify_table",
+    "law_pieces",
     "study_rows",
     "track_table",
     "trend_tables",
@@ -158,6 +162,8 @@ def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
     pieces.append(step_table(outcome))
     if finding.steps:
         pieces.append(effect_table(outcome))
+        for step in finding.steps:
+            pieces += law_lines(effect_named(step.effect))
     pieces += [
         table if table.rows else f"{table.title}: {table.note}"
         for table in rankings(outcome, _RANKED)
@@ -166,6 +172,17 @@ def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
     if experiments is not None:
         pieces.append(experiments)
     return _Fitted(pieces, warnings(outcome))
+
+
+def law_pieces(effect: Effect) -> RenderableType:
+    """Return the equations of an effect, its parameters with bounds, and its source."""
+    found: list[_Piece] = [
+        f"{effect.name}: {family_label(effect.family)}, acts on the {effect.acts_on}",
+        f"{effect.summary[:1].upper()}{effect.summary[1:]}.",
+        *law_lines(effect),
+        bounds_table(effect),
+    ]
+    return _Fitted(found, ())
 
 
 def _grouped(alone: str, comparisons: tuple[Comparison, ...]) -> list[_Piece]:

@@ -1,9 +1,9 @@
-"""Commands that help to set up: files to begin with, presets, doctor, docs."""
+"""Commands that look up and set up: files to begin with, presets, laws, doctor, docs."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -16,6 +16,7 @@ __all__ = ["commands"]
 commands = typer.Typer()
 ToWrite = Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")]
 _PANEL = "Set-up and help"
+_MODELS = "Models"
 
 
 @commands.command(rich_help_panel=_PANEL)
@@ -126,6 +127,78 @@ def presets(json: Json = None, force: Force = False) -> None:
         for name, s in found.items()
     ]
     write_result({"format": "dearig-presets/1", "presets": listed}, json)
+
+
+@commands.command(rich_help_panel=_MODELS)
+def effects(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME",
+            help="Effect to explain, as 'dry friction'.",
+            show_default="a list of all",
+        ),
+    ] = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """List the effects that the diagnosis knows, or print the equations of one.
+
+    With NAME: its equations, the meaning, unit and bounds of each parameter, and the source.
+    """
+    from itertools import groupby
+
+    from dearig.cli.terminal import law_pieces
+    from dearig.model.effects import EFFECTS
+    from dearig.report.text.diagnosis import family_label
+    from dearig.report.text.laws import effect_named, law_json
+
+    check_files(force, (), json=json)
+    console = console_for(json)
+    if name is not None:
+        effect = effect_named(name)
+        console.print(law_pieces(effect))
+        write_result({"format": "dearig-effects/1", "effects": [law_json(effect)]}, json)
+        return
+    listed = sorted(EFFECTS.values(), key=lambda e: (e.family == "unknown", e.family, e.name))
+    for family, members in groupby(listed, key=lambda e: e.family):
+        print_line(console, family_label(family).capitalize(), "bold")
+        for effect in members:
+            print_line(console, f"  {effect.name} (acts on the {effect.acts_on}): {effect.summary}")
+    print_line(console, 'Equations of one: dearig effects "NAME"')
+    result = {"format": "dearig-effects/1", "effects": [law_json(e) for e in listed]}
+    write_result(result, json)
+
+
+@commands.command("export-model", rich_help_panel=_MODELS)
+def export_model(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.toml", help="A model file.")],
+    to: Annotated[
+        Literal["latex", "python", "prony"],
+        typer.Option(
+            help="A page of equations with numbers; a Python file that needs NumPy alone; "
+            "strain energy and Prony series for finite-element programs."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="File to write.", show_default="next to the model"
+        ),
+    ] = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Write a model for another program: equations, Python or finite elements."""
+    from dearig.config.modelfile import load_model
+    from dearig.report.model_export.write import KINDS, write_export
+
+    written = model.with_suffix(KINDS[to]) if out is None else out
+    check_files(force, (model,), written, json=json)
+    write_export(load_model(model), to, written, force)
+    print_line(console_for(json), str(written))
+    result = {"format": "dearig-model-export/1", "model": str(model), "to": to, "out": str(written)}
+    write_result(result, json)
 
 
 @commands.command(rich_help_panel=_PANEL)

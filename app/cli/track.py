@@ -108,7 +108,6 @@ def track(
     done.
     """
     from dearig.acquisition.rig_source import SOURCE, film_differences
-    from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.track import track as follow
     from dearig.analysis.track_target import check_feasible, plan_target
@@ -132,9 +131,8 @@ def track(
         return
     if out is None:
         raise InputError("--out DIR is missing: recordings and the report are written there")
-    faults = read_faults(fault or ())
     options = RunOptions(
-        text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=faults,
+        text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=fault or (),
         provenance=provenance,
     )  # fmt: skip
     report = out / "report.html"

@@ -30,7 +30,15 @@ from dearig.config.presets import PRESETS
 from dearig.config.safe_ends import SAFE_ENDS, SafeEnd
 from dearig.config.sequence_paths import clean, filled, flat, with_settings
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
-from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
+from dearig.config.toml_input import (
+    NAME_MAX,
+    TomlTable,
+    allowed,
+    meant,
+    parse_toml,
+    read_text,
+    shown,
+)
 from dearig.errors import InputError
 
 __all__ = [
@@ -105,7 +113,7 @@ every_cycle = 0                 # of the others keep every n-th cycle at full ra
 """
 
 
-class _Run(Table):
+class _Run(TomlTable):
     sequence: str | None = Field(
         default=None, min_length=1, max_length=NAME_MAX,
         description="a preset, or a sequence file in the plan's folder",
@@ -116,7 +124,7 @@ class _Run(Table):
     )
 
 
-class _WarmUp(Table):
+class _WarmUp(TomlTable):
     runs: int = Field(default=1, ge=0, le=1000, description="runs before the others")
     sequence: str | None = Field(
         default=None, min_length=1, max_length=NAME_MAX,
@@ -124,7 +132,7 @@ class _WarmUp(Table):
     )  # fmt: skip
 
 
-class _After(Table):
+class _After(TomlTable):
     identify: bool = Field(default=False, description="fit the model")
     validates: bool = Field(
         default=False, alias="validate", description="compare with the last model"
@@ -140,14 +148,14 @@ class _After(Table):
     )
 
 
-class _Keep(Table):
+class _Keep(TomlTable):
     every: int = Field(default=1, ge=1, le=RUNS_MAX, description="recordings that are kept whole")
     every_cycle: int = Field(
         default=0, ge=0, le=10**9, description="cycles of the others that are kept at full rate"
     )
 
 
-class _File(Table):
+class _File(TomlTable):
     name: str = Field(min_length=1, max_length=80, description="name of the campaign")
     sequence: str | None = Field(
         default=None, min_length=1, max_length=NAME_MAX,
@@ -183,7 +191,7 @@ class _File(Table):
 
 
 #: Fields of a plan's top level, for a form.
-PLAN_TABLE: type[Table] = _File
+PLAN_TABLE: type[TomlTable] = _File
 
 _COMPARISONS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
     {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
@@ -525,12 +533,12 @@ def _beside(folder: Path, name: str, key: str) -> Path:
 
 # ---------------------------------------------------------------- messages
 
-_TABLES: Mapping[str, type[Table]] = MappingProxyType(
+_TABLES: Mapping[str, type[TomlTable]] = MappingProxyType(
     {"run": _Run, "warm_up": _WarmUp, "after": _After, "keep": _Keep, "notify": NotifyTable}
 )
 
 
-def _keys(table: type[Table]) -> dict[str, FieldInfo]:
+def _keys(table: type[TomlTable]) -> dict[str, FieldInfo]:
     return {info.alias or name: info for name, info in table.model_fields.items()}
 
 

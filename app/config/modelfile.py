@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tomli_w
 from pydantic import Field, ValidationError, create_model
 
-from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
+from dearig.config.toml_input import (
+    NAME_MAX,
+    TomlTable,
+    allowed,
+    meant,
+    parse_toml,
+    read_text,
+    shown,
+)
 from dearig.errors import InputError
 from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
@@ -82,7 +90,7 @@ class ModelFile:
         return self.history.get(HELD_VOLTAGE) is True
 
 
-class _Film(Table):
+class _Film(TomlTable):
     length_m: _Positive
     width_m: _Positive
     thickness_m: _Positive
@@ -90,12 +98,12 @@ class _Film(Table):
     density_kg_m3: _Positive = 1000.0
 
 
-class _Load(Table):
+class _Load(TomlTable):
     mass_kg: Annotated[float, Field(ge=0.0)]
     rest_length_m: _Positive | None = None
 
 
-class _SpringBase(Table):
+class _SpringBase(TomlTable):
     spring: SpringName = "gent"
     modulus_Pa: Annotated[float, Field(ge=0.0)]
     limit: _Positive | None = None
@@ -143,7 +151,7 @@ _SINCE_THEN: dict[str, dict[str, float | str]] = {
 _REMOVED = {"wandering drift": "fitful drift", "restless drift": "fitful drift"}
 
 
-class _Effect(Table):
+class _Effect(TomlTable):
     name: str
     values: dict[str, float]
 
@@ -165,7 +173,7 @@ class _Effect(Table):
         return self.name, tuple(sorted(values.items(), key=lambda v: place.get(v[0], len(place))))
 
 
-class _File(Table):
+class _File(TomlTable):
     format: str
     name: str = Field(min_length=1, max_length=NAME_MAX)
     kinematics: Literal["constrained-width", "uniaxial", "equibiaxial"]
@@ -313,7 +321,7 @@ def _plain(value: Any) -> Any:
 
 #: Keys that hold one table for each of several things.
 _LISTS = ("branch", "effect")
-_TABLES: Mapping[str, type[Table]] = {
+_TABLES: Mapping[str, type[TomlTable]] = {
     "film": _Film,
     "load": _Load,
     "equilibrium": _Spring,
@@ -326,7 +334,7 @@ def _sentence(error: ValidationError) -> str:
     faults = error.errors(include_url=False)
     fault = min(faults, key=lambda f: f["type"] != "extra_forbidden")
     place = [p for p in fault["loc"] if p != "[key]"]
-    table: type[Table] = _File
+    table: type[TomlTable] = _File
     dotted = ""
     for part in place[:-1]:
         if isinstance(part, int):

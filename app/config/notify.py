@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from pydantic import Field
 
-from dearig.config.toml_input import Table
+from dearig.config.toml_input import TomlTable
 from dearig.errors import InputError
 
 __all__ = ["EVENTS", "Notify", "NotifyTable", "notify_sentence", "redacted"]
@@ -67,7 +67,7 @@ def notify_sentence(notify: Notify) -> str:
     return f"at {', '.join(notify.on)} this {' and '.join(told)}" if told else ""
 
 
-class NotifyTable(Table):
+class NotifyTable(TomlTable):
     """The table ``[notify]`` of a plan."""
 
     command: list[str] = Field(

@@ -19,7 +19,15 @@ from pydantic_core import ErrorDetails
 from dearig.config.presets import PRESETS
 from dearig.config.segments import SEGMENT_KINDS, SegmentTable
 from dearig.config.segments.base import SEGMENTS_MAX
-from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
+from dearig.config.toml_input import (
+    NAME_MAX,
+    TomlTable,
+    allowed,
+    meant,
+    parse_toml,
+    read_text,
+    shown,
+)
 from dearig.drivers.samples import Computed, Samples
 from dearig.errors import InputError
 from dearig.input_file import open_input
@@ -131,7 +139,7 @@ class LoadedSequence:
             raise InputError(found[0].sentence + _more(len(found) - 1))
 
 
-class _Head(Table):
+class _Head(TomlTable):
     name: str = Field(min_length=1, max_length=NAME_MAX, description="title of the recording")
     lead_in_s: float = Field(
         default=2.0, ge=0.0, le=3600.0, description="time at 0 V before the segments"
@@ -146,7 +154,7 @@ HEAD_FIELDS: Mapping[str, FieldInfo] = MappingProxyType(_Head.model_fields)
 
 
 @cache
-def _model(kinds: tuple[type[SegmentTable], ...]) -> type[Table]:
+def _model(kinds: tuple[type[SegmentTable], ...]) -> type[TomlTable]:
     """Return the model of a sequence file with these kinds of segment."""
     one: Any = Union[kinds]  # noqa: UP007  (made at run time)
     segments: Any = list[Annotated[one, Discriminator("kind")]]

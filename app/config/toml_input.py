@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 from dearig.errors import InputError
 from dearig.input_file import read_input
 
-__all__ = ["NAME_MAX", "Table", "allowed", "meant", "parse_toml", "read_text", "shown"]
+__all__ = ["NAME_MAX", "TomlTable", "allowed", "meant", "parse_toml", "read_text", "shown"]
 
 #: Bytes of a file, at most: three times a sequence of 10,000 segments of some 70 bytes, which is
 #: the largest that is played. Python's parser takes about a second for so much.
@@ -55,7 +55,7 @@ _UNITS = frozenset(
 )
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """A table of a file that people write: immutable, no unknown keys, no text for numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

@@ -6,12 +6,14 @@ import posixpath
 import re
 from collections.abc import Callable
 from functools import cache
+from html import escape
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from dearig.docs.pages import OPEN_SECTIONS, Page, file_at, page_at, pages
 from dearig.errors import InputError
+from dearig.formulas import as_text, mathml
 
 __all__ = ["anchors", "build", "slug", "to_html"]
 
@@ -19,7 +21,7 @@ __all__ = ["anchors", "build", "slug", "to_html"]
 Address = Callable[[str], str | None]
 
 
-def to_html(page: Page, address: Address | None = None) -> str:
+def to_html(page: Page, address: Address | None = None, *, formulas: bool = True) -> str:
     """Return the body of a page as HTML.
 
     Parameters
@@ -29,6 +31,8 @@ def to_html(page: Page, address: Address | None = None) -> str:
         Maps the repository's path of a linked file to the address in the HTML. Where it returns
         None (a file that is not packaged) the link's text is shown without a link. By default the
         path itself is the address.
+    formulas : bool
+        Formulas are MathML; otherwise text, for a viewer without MathML.
     """
     parser = _markdown()
     tokens = parser.parse(page.text)
@@ -36,7 +40,7 @@ def to_html(page: Page, address: Address | None = None) -> str:
     for token in tokens:
         if token.type == "inline" and token.children:
             token.children = _relinked(token.children, page.path, address or str)
-    return str(parser.renderer.render(tokens, parser.options, {}))
+    return str(parser.renderer.render(tokens, parser.options, {"formulas": formulas}))
 
 
 def anchors(text: str) -> list[str]:
@@ -206,7 +210,18 @@ def _markdown() -> Any:
     # wide tables scroll by themselves, so that the page does not
     parser.add_render_rule("table_open", lambda *_: '<div class="table"><table>\n')
     parser.add_render_rule("table_close", lambda *_: "</table></div>\n")
+    parser.add_render_rule("fence", _fence)
     return parser.enable(["table", "strikethrough"])
+
+
+def _fence(renderer: Any, tokens: list[Any], at: int, options: Any, env: Any) -> str:
+    """A block of code, or a formula where its language is ``math``."""
+    if tokens[at].info.strip() != "math":
+        return str(renderer.fence(tokens, at, options, env))
+    formula = " ".join(tokens[at].content.split())
+    if env.get("formulas", True):
+        return f'<div class="formula">{mathml(formula)}</div>\n'
+    return f"<pre><code>{escape(as_text(formula))}</code></pre>\n"
 
 
 def _highlighted(code: str, language: str, _attributes: str) -> str:

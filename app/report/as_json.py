@@ -14,6 +14,7 @@ from dearig.analysis.outcomes import (
     pooled_steady_rms,
 )
 from dearig.model.verdict import is_rejected, smallest_p
+from dearig.report.text.laws import effect_named, law_json
 from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
 
@@ -206,9 +207,12 @@ def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:
 def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
     """``outcome`` for ``--json`` of diagnose, in the units that the keys end with."""
     # One piece: the document key by key, as the page on JSON lists it.
+    from dearig.report.text.diagnosis import signatures_of
+
     finding, shown = outcome.finding, SHOWN[outcome.kind]
     before, after = outcome.before, outcome.after
     experiment = outcome.experiment
+    residual_before, residual_after = signatures_of(outcome)
     return {
         "format": "dearig-diagnosis/1",
         "title": outcome.title,
@@ -226,6 +230,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "family": step.family,
                 "acts_on": step.acts_on,
                 "parameters": [_effect_number_json(e) for e in step.estimates],
+                "law": law_json(effect_named(step.effect)),
                 "train": _measures_json(stand.train, outcome.kind),
                 "selection": _selection_json(step.stage, after.train, outcome.kind),
                 "validation": _measures_json(stand.validation, outcome.kind),
@@ -239,9 +244,9 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "final": _stand_json(after),
         "residual_after": {
             "is_noise": all(s.is_noise for s in finding.after),
-            "signature": {s.record: _signature_json(s, outcome.kind) for s in finding.after},
+            "signature": {s.record: _signature_json(s, outcome.kind) for s in residual_after},
         },
-        "residual_before": {s.record: _signature_json(s, outcome.kind) for s in finding.before},
+        "residual_before": {s.record: _signature_json(s, outcome.kind) for s in residual_before},
         "verdict": outcome.verdict,
         "verdict_reasons": list(outcome.judgement.reasons),
         "recommended": "final" if outcome.recommends_final else "baseline",
@@ -258,7 +263,14 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             for c in (*after.train, *after.validation)
             for e in c.events
         ],
-        "families": [{"family": f, "probability": p} for f, p in outcome.families],
+        "families": [
+            {
+                "family": f,
+                "probability": p,
+                "probability_missing": _number(outcome.marginals.get(f)),
+            }
+            for f, p in outcome.families
+        ],
         "unnamed": None
         if finding.unnamed is None
         else {

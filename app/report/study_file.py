@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.outcomes import Comparison
-from dearig.analysis.study import Residual, Study, Task, Trace, study
+from dearig.analysis.study import Residual, Study, StudyRequest, Trace, study
 from dearig.errors import InputError
 from dearig.input_file import parse_json, read_input
 from dearig.model.readings.measures import Errors
@@ -36,7 +36,7 @@ _MEASURES = tuple(field.name for field in fields(Errors))
 StudyEntry = tuple[Path, str, str]
 
 
-def make_study(task: Task, folder: Path, progress: Progress = quiet) -> Study:
+def make_study(task: StudyRequest, folder: Path, progress: Progress = quiet) -> Study:
     """Do ``task`` in a new folder within ``folder``, with its report, and save what is shown of it.
 
     Raises ``InputError``, see ``dearig.analysis.study.study``.

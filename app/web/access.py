@@ -17,7 +17,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-__all__ = ["Guard", "is_loopback"]
+__all__ = ["AccessGuard", "is_loopback"]
 
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
@@ -42,7 +42,7 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-class Guard:
+class AccessGuard:
     """Lets only requests through to ``app`` that may read the page, which is shown at ``host``.
 
     ``token`` None admits everybody who reaches the loopback. A request shows the token in its

@@ -10,7 +10,7 @@ from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
-from dearig.web.access import Guard
+from dearig.web.access import AccessGuard
 from dearig.web.feed import Feed
 
 __all__ = ["watch_app"]
@@ -47,4 +47,4 @@ def watch_app(feed: Feed, host: str, port: int, token: str | None) -> ASGIApp:
         return StreamingResponse(feed.stream(), media_type="text/event-stream")
 
     routes = [Route("/live", live), *(file(path, *about) for path, about in _FILES.items())]
-    return Guard(Starlette(routes=routes), host, port, token)
+    return AccessGuard(Starlette(routes=routes), host, port, token)

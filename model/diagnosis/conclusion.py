@@ -116,7 +116,7 @@ class Conclusion:
         return [(other, fit) for _, other, fit in sorted(taken.values(), key=lambda t: t[0])]
 
     def nearest(self, member: str) -> tuple[str, float] | None:
-        """Return the best law with a name in place of a general one, and its RMS over the noise."""
+        """Return the best law with a name in place of a general one, and its cost."""
         if member == DRIFT or not EFFECTS[member].is_general:
             return None
         others = self.found.best.members - {member}
@@ -131,7 +131,7 @@ class Conclusion:
         if not named:
             return None
         cost, name = min(named)
-        return name, math.sqrt(cost)
+        return name, cost
 
     def _form(self) -> float:
         """Return the difference of costs by which no two laws are told apart."""
@@ -184,8 +184,9 @@ class Conclusion:
                 if e.name.startswith(f"{name}: ")
             )
             said = [
-                f"without it the residual is {math.sqrt(without.cost):.3g} times the noise, with "
-                f"it {math.sqrt(best.cost):.3g} times",
+                # of the thinned and whitened readings: not the error over the noise of a table
+                f"without it the mean square of the fit's weighted residuals is "
+                f"{without.cost / best.cost:.3g} times as large",
                 f"without it the information criterion is worse by {worth:.0f}",
                 *(f"{_label(other)} explains these data as well" for other, _ in alike),
             ]
@@ -193,7 +194,7 @@ class Conclusion:
             if nearest is not None:
                 said.append(
                     f"its form is that of no law with a name: {nearest[0]} comes nearest, and "
-                    f"leaves {nearest[1]:.3g} times the noise"
+                    f"leaves {nearest[1] / best.cost:.3g} times the mean square"
                 )
             stage = final
             if i < len(order) - 1:
@@ -258,6 +259,7 @@ def conclude(
     open_end = verdict in (UNEXPLAINED, PARTLY_EXPLAINED) and found.status != "stopped"
     if open_end or any(s.family == "unknown" for s in steps):
         unnamed = unnamed_of(steps, missing_after, after)
+    fits = list(found.fits.values())
     return Diagnosis(
         verdict=verdict,
         baseline=first,
@@ -275,7 +277,8 @@ def conclude(
         held=held,
         notes=tuple(_notes(end, others, after, held)),
         status=found.status,
-        families=_families(end),
+        families=_families(end, judge.probabilities(fits, found.sought)),
+        marginals=_families(end, judge.marginals(fits, found.sought)),
     )
 
 
@@ -299,13 +302,14 @@ def _label(member: str) -> str:
     return "slow drift of the reading" if member == DRIFT else member
 
 
-def _families(end: Conclusion) -> tuple[tuple[str, float], ...]:
-    """Return the probability of each family, largest first; they add up to 1."""
-    found = end.judge.probabilities(list(end.found.fits.values()), end.found.sought)
+def _families(end: Conclusion, found: dict[str, float]) -> tuple[tuple[str, float], ...]:
+    """Return the probabilities ``found`` of the families for what ``end`` explains, largest first.
+
+    What no fit explains is of no known family.
+    """
     if not end.is_small and not (
         end.found.best.members and end.explained > end.judge.settings.trusted_share
     ):
-        # what no fit explains is of no known family
         left = 1.0 - max(end.explained, 0.0)
         found = {family: p * (1.0 - left) for family, p in found.items()}
         found["unknown"] = found.get("unknown", 0.0) + left

@@ -11,7 +11,7 @@ import numpy as np
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
 from dearig.model.diagnosis.preparation import has_line_at_rest
-from dearig.model.diagnosis.race import Candidate, race
+from dearig.model.diagnosis.race import RaceEntry, race
 from dearig.model.diagnosis.regression import Regression, Start, is_unseen
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS, Effect
@@ -341,7 +341,7 @@ class Search:
     def _run(self, parent: Fit, starts: Mapping[str, list[Start]]) -> list[Fit]:
         """Return the fits that came through one race, and keep them: the next may be the last."""
         candidates = [
-            Candidate(name, tuple(some), is_unseen(EFFECTS[name])) for name, some in starts.items()
+            RaceEntry(name, tuple(some), is_unseen(EFFECTS[name])) for name, some in starts.items()
         ]
         return [self.keep(fit) for fit in race(self.fitter, self.judge, parent, candidates)]
 

@@ -24,13 +24,13 @@ from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.records import ActuatorRecord, Record
 from dearig.model.simulation.actuator import Actuator
 
-__all__ = ["Event", "Own", "drifts_at_rest", "own_of"]
+__all__ = ["OneTimeEvent", "Own", "drifts_at_rest", "own_of"]
 
 _ITERATIONS = 20  # of the fit of one size and one moment
 
 
 @dataclass(frozen=True)
-class Event:
+class OneTimeEvent:
     """One event: the effect ``kind`` of that ``size`` in ``unit``, at ``time`` s."""
 
     kind: str
@@ -48,7 +48,7 @@ class Own:
     add to the reading.
     """
 
-    events: tuple[Event, ...]
+    events: tuple[OneTimeEvent, ...]
     drifts: bool
     rms: float
     signal: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False)
@@ -106,7 +106,7 @@ def own_of(
     for name in added:
         size, moment = EFFECTS[name].parameters
         found = dict(numbers[name])
-        events.append(Event(name, found[moment.name], found[size.name], size.unit))
+        events.append(OneTimeEvent(name, found[moment.name], found[size.name], size.unit))
     whole = _as_it_is(fitter.careful_problem(best.model, best.drift))
     bare = _as_it_is(fitter.careful_problem(model, 0.0)).plain_residuals()
     error, own = whole.plain_residuals(), whole.problem.noise_drift

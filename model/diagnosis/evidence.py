@@ -144,16 +144,40 @@ class Judge:
         return self.gain(parent, fit) > s.odds and parent.cost - fit.cost > s.form_error and enough
 
     def probabilities(self, fits: Sequence[Fit], sought: Iterable[str] = ()) -> dict[str, float]:
-        """Return the probability of each family: that it is among what is missing.
+        """Return the share of each family in the probability of what is missing; they add up to 1.
 
-        Sums exp(-C/2t) over ``fits``, each with prior odds of e^(-odds/2) an effect, with the
+        A fit with several families shares its probability out among them, so that two that are both
+        certain have a half each. ``none`` is the baseline, ``unknown`` what no fit explains.
+        """
+        found: dict[str, float] = {}
+        for weight, families in self._weighted(fits, sought):
+            for family in families:
+                found[family] = found.get(family, 0.0) + weight / len(families)
+        return found
+
+    def marginals(self, fits: Sequence[Fit], sought: Iterable[str] = ()) -> dict[str, float]:
+        """Return the probability of each family that it is among what is missing.
+
+        They do not add up to 1: several families may be missing together.
+        """
+        found: dict[str, float] = {}
+        for weight, families in self._weighted(fits, sought):
+            for family in families:
+                found[family] = found.get(family, 0.0) + weight
+        return found
+
+    def _weighted(
+        self, fits: Sequence[Fit], sought: Iterable[str]
+    ) -> list[tuple[float, list[str]]]:
+        """Return the probability of each fit, and its families.
+
+        Weighs each by exp(-C/2t), with prior odds of e^(-odds/2) an effect, with the
         tempering t of the settings. A family that was ``sought``, and of which there is no fit
         beside the baseline alone, is taken for one effect of one number that explains nothing: that
-        a record does not show it does not exclude it. ``none`` is the baseline, ``unknown`` what no
-        fit explains.
+        a record does not show it does not exclude it.
         """
         if not fits:
-            return {"none": 1.0}
+            return [(1.0, ["none"])]
         s = self.settings
         scores = [
             (self.criterion(f) + s.odds * len(f.members), {family_of(m) for m in f.members})
@@ -171,9 +195,7 @@ class Judge:
         least = min(score for score, _ in scores)
         weights = [math.exp(-0.5 * (score - least) / s.tempering) for score, _ in scores]
         total = sum(weights)
-        found: dict[str, float] = {}
-        for weight, (_, families) in zip(weights, scores, strict=True):
-            for family in families or {"none"}:
-                share = weight / total / max(len(families), 1)
-                found[family] = found.get(family, 0.0) + share
-        return found
+        return [
+            (weight / total, sorted(families or ["none"]))
+            for weight, (_, families) in zip(weights, scores, strict=True)
+        ]

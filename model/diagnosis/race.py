@@ -19,13 +19,13 @@ from dearig.model.diagnosis.regression import Start
 from dearig.model.diagnosis.shapes import typical_values
 from dearig.model.effects import EFFECTS
 
-__all__ = ["Candidate", "race"]
+__all__ = ["RaceEntry", "race"]
 
 _TINY = 1e-3  # of the typical amplitude: an effect that hardly acts, and has a derivative
 
 
 @dataclass(frozen=True)
-class Candidate:
+class RaceEntry:
     """An effect that is added to a parent, and the starts of their fit, best first.
 
     One that is ``certain`` enters in any case: the regression does not see what it explains.
@@ -41,7 +41,7 @@ class Candidate:
         return self.starts[0].misfit
 
 
-def race(fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
+def race(fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[RaceEntry]) -> list[Fit]:
     """Return the fits of the candidates that came through the race, the most probable first."""
     rungs = fitter.settings.rungs
     ranked = sorted(candidates, key=lambda c: c.misfit)
@@ -82,7 +82,7 @@ def _leading(judge: Judge, runners: Sequence[Fit], effects: int, abreast: bool) 
     return [next(fit for fit in ranked if fit.members == key) for key in keys]
 
 
-def _entered(fitter: Fitter, parent: Fit, candidate: Candidate, iterations: int) -> list[Fit]:
+def _entered(fitter: Fitter, parent: Fit, candidate: RaceEntry, iterations: int) -> list[Fit]:
     """Return first fits of a candidate: from its best start with new springs, and with old ones."""
     name = candidate.effect
     model = with_effect(parent.model, name, typical_values(EFFECTS[name]))

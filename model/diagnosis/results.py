@@ -133,7 +133,9 @@ class Diagnosis:
     linear between samples, but the data show that it is held until the next. ``notes`` are
     sentences for the operator. ``status`` is ``complete``, ``stopped`` (by the operator) or
     ``budget`` (the search took the work that it may). ``families`` are the probabilities of the
-    families, of ``none`` and of ``unknown``, largest first, which add up to 1.
+    families, of ``none`` and of ``unknown``, largest first, which add up to 1: several that
+    are missing together share theirs. ``marginals`` are the probabilities that each is among what
+    is missing, which do not add up to 1.
     """
 
     verdict: str
@@ -153,3 +155,4 @@ class Diagnosis:
     notes: tuple[str, ...] = field(default=())
     status: str = "complete"
     families: tuple[tuple[str, float], ...] = ()
+    marginals: tuple[tuple[str, float], ...] = ()

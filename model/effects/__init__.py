@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dearig.model.effects.description import FAMILIES, Curve, Effect, EffectValues, Parameter
+from dearig.model.effects.description import FAMILIES, Curve, Effect, EffectValues, Law, Parameter
 
 if TYPE_CHECKING:
     from dearig.model.effects.registry import (
@@ -42,6 +42,7 @@ __all__ = [
     "Curve",
     "Effect",
     "EffectValues",
+    "Law",
     "Parameter",
     "Place",
     "any_hysteretic",

@@ -9,7 +9,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["ACTS_ON", "FAMILIES", "Curve", "Effect", "EffectValues", "Parameter", "faults_of"]
+__all__ = [
+    "ACTS_ON",
+    "COMMON_SYMBOLS",
+    "FAMILIES",
+    "Curve",
+    "Effect",
+    "EffectValues",
+    "Law",
+    "Parameter",
+    "faults_of",
+]
 
 #: The places of the signal path where an effect can act.
 ACTS_ON = (
@@ -62,6 +72,61 @@ class Curve(NamedTuple):
     values: np.ndarray
     axis_label: str
     values_label: str
+
+
+#: Symbols that equations of effects share, in LaTeX, and what each means.
+COMMON_SYMBOLS: tuple[tuple[str, str], ...] = (
+    (r"\lambda", "stretch, length over L_1"),
+    (r"\lambda_0", "stretch at rest"),
+    (r"\dot{\lambda}", "rate of stretch in 1/s"),
+    (r"\delta", "change of stretch from rest"),
+    (r"\sigma", "nominal stress that pulls the film together, in Pa"),
+    (r"\sigma_0", "the same of the model's springs and branches alone"),
+    (r"\sigma_E", "Maxwell stress that stretches the film, in Pa"),
+    (r"\sigma_M", "the same of the model: eps (V/Z)^2 lambda with the width held"),
+    ("V", "voltage at the film"),
+    (
+        "U",
+        "voltage before this effect: the command, or that behind the effects before",
+    ),
+    ("V_E", "voltage that counts in the Maxwell stress, in place of V"),
+    ("E", "true field in the film"),
+    ("z", "thickness of the film as it is"),
+    ("Z", "thickness of the film before it is stretched; Z/z = lambda with the width held"),
+    ("L_1", "length of the film before it is stretched"),
+    ("L_2", "width of the film"),
+    ("C", "capacitance of the film"),
+    ("C_0", "capacitance of the film before it is stretched"),
+    ("F", "load"),
+    (r"\rho", "density of the film"),
+    ("x", "displacement before this effect, in m"),
+    ("r", "reading of the sensor, in m"),
+    ("h", "relative humidity of the room, 0 to 1"),
+    ("t", "time since the recording began"),
+)
+
+
+@dataclass(frozen=True)
+class Law:
+    """The equations of an effect, for a person.
+
+    Parameters
+    ----------
+    equations
+        Each in LaTeX, without delimiters. They say what the hooks compute.
+    symbols
+        Symbol of each parameter of the effect in LaTeX, in the order of its parameters.
+    source
+        The publication of the law, or what an elementary law is called.
+    where
+        Further symbols with their meaning: those that are neither a parameter's nor in
+        ``COMMON_SYMBOLS``, and those that mean something else here.
+    """
+
+    equations: tuple[str, ...]
+    symbols: tuple[str, ...]
+    source: str
+    where: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -154,6 +219,9 @@ class Effect:
     needs
         What recordings must have beside voltage and displacement: ``temperature`` during each, or
         ``temperatures`` or ``humidity`` of several recordings that differ in it. Empty for most.
+    law
+        Its equations with the symbols of its parameters, and their source. Every effect of this
+        project has one; another distribution's effect without one is listed without an equation.
     drift_basis
         For a drift of the reading that is linear in the amplitudes and different in every
         recording: a function of times (N,) s that returns what a unit of each amplitude adds to the
@@ -176,6 +244,7 @@ class Effect:
     curve: Callable[[Mapping[str, float]], Curve] | None = None
     drift_basis: Callable[[np.ndarray], np.ndarray] | None = None
     needs: str = ""
+    law: Law | None = None
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:
@@ -193,11 +262,33 @@ _DRIVES = ("voltage", "stretch")
 _NEEDS = ("", "temperature", "temperatures", "humidity")
 
 
-def faults_of(effect: object) -> list[str]:
-    """Return what is wrong with the description of an effect, in sentences; none if all is well."""
+def faults_of(effect: object, *, with_law: bool = False) -> list[str]:
+    """Return what is wrong with the description of an effect, in sentences; none if all is well.
+
+    ``with_law``: its equations are required, as they are of every effect of this project.
+    """
     if not isinstance(effect, Effect):
         return ["it has no EFFECT of the class dearig.model.effects.Effect"]
-    return list(_faults(effect))
+    faults = list(_faults(effect))
+    if effect.law is not None:
+        faults += _law_faults(effect, effect.law)
+    elif with_law:
+        faults.append("it has no law: its equations, the symbols of its parameters, their source")
+    return faults
+
+
+def _law_faults(effect: Effect, law: Law) -> Iterator[str]:
+    if not law.equations or not all(law.equations):
+        yield "its law has no equation"
+    if not law.source:
+        yield "its law has no source"
+    if len(law.symbols) != len(effect.parameters):
+        yield (
+            f"its law has {len(law.symbols)} symbols for {len(effect.parameters)} parameters: it "
+            f"needs one for each, in their order"
+        )
+    if len(set(law.symbols)) < len(law.symbols):
+        yield f"two parameters have one symbol in its law: {', '.join(law.symbols)}"
 
 
 def _faults(effect: Effect) -> Iterator[str]:

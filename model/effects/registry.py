@@ -33,6 +33,7 @@ __all__ = [
     "MEMORY",
     "NEUTRAL",
     "ORIGINS",
+    "OURS",
     "PARAMETER_COUNT",
     "PLACES",
     "PROBLEMS",
@@ -47,7 +48,8 @@ __all__ = [
 #: 64-bit number that is not negative.
 EFFECTS_MAX = 62
 
-_OURS = "dearig"
+#: What ``ORIGINS`` says of the effects of this folder.
+OURS = "dearig"
 
 
 @dataclass(frozen=True)
@@ -170,7 +172,7 @@ def _found() -> _Finder:
         # hooks of this folder are compiled with the kernel, and their tests check the rest
         if module.EFFECT.name in finder.effects:
             raise ImportError(f"two effects are called {module.EFFECT.name!r}")
-        finder.add(module, _OURS)
+        finder.add(module, OURS)
     for entry_point in entry_points_found():
         finder.add_plugin(entry_point)
     if finder.problems:

@@ -8,6 +8,7 @@ where no gain is left.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,6 @@ from scipy.optimize import lsq_linear
 
 from dearig.model.fitting.levenberg import LocalFit
 from dearig.model.fitting.problem import Problem
-from dearig.model.fitting.space_mapping import descend_coarsely
 
 __all__ = ["boxed_step", "descend_broyden"]
 
@@ -79,7 +79,7 @@ def descend_broyden(
     def on_coarse_drives(coarse_problem: Problem, here: LocalFit, iterations: int) -> LocalFit:
         return _broyden(coarse_problem, here, free, iterations, gain, sure, coarse=False)
 
-    reached = descend_coarsely(on_coarse_drives, problem, here, free, iterations, gain)
+    reached = _descend_coarsely(on_coarse_drives, problem, here, free, iterations, gain)
     if reached.iterations >= iterations or (reached.converged and not sure):
         return reached
     # a coarse descent needs every column; a Jacobian of the full problem uses those there are
@@ -184,3 +184,45 @@ def _broyden(
         # ended just after a poor prediction: the next descent computes the Jacobian
         jac = np.full((r.size, int(free.sum())), np.nan)
     return LocalFit(x, chi2 / problem.samples, r, jac, done, converged)
+
+
+#: Descent of a problem from a fit, with at most so many iterations.
+Descent = Callable[[Problem, LocalFit, int], LocalFit]
+
+
+def _descend_coarsely(
+    descent: Descent,
+    problem: Problem,
+    here: LocalFit,
+    free: np.ndarray,
+    iterations: int,
+    gain: float,
+) -> LocalFit:
+    """Return the fit that ``descent`` reaches from ``here`` under the coarse drives, or ``here``.
+
+    At the start of each descent the difference between full and coarse readings is added as a
+    correction, so the sequence ends where a descent on the full records ends (space mapping;
+    Bandler et al., IEEE Trans. Microw. Theory Tech. 42, 2536 (1994)). Cost and residuals are those
+    of the full records. The fit has not converged where the coarse drives give no derivative of a
+    ``free`` (d,) parameter, or where they do not lower the full cost: the caller then continues on
+    the full records.
+    """
+    done = 0
+    while done < iterations:
+        coarse = problem.space_mapped(here.x, here.residuals, free)
+        if coarse is None:
+            return replace(here, converged=False)
+        fit = descent(coarse, here, iterations - done)
+        done += max(fit.iterations, 1)
+        if np.array_equal(fit.x, here.x):
+            return replace(here, jacobian=fit.jacobian, iterations=done, converged=fit.converged)
+        costs, residuals = problem.evaluate(fit.x[None])
+        cost = float(costs[0])
+        if not cost < here.cost:
+            return replace(here, iterations=done, converged=False)
+        gained = (here.cost - cost) * problem.samples
+        missed = abs(cost - fit.cost) * problem.samples
+        here = LocalFit(fit.x, cost, residuals[0], fit.jacobian, done, fit.converged)
+        if fit.converged and min(gained, missed) < gain:
+            break
+    return here

@@ -341,7 +341,7 @@ def _descend_on_means(
     """Return coordinates (d,) near the optimum of ``problem``, by descents on its ``means``.
 
     Each descent begins with the readings of the means moved to where they agree with the full
-    problem (space mapping, as in ``dearig.model.fitting.space_mapping``). It ends where the full
+    problem (space mapping, as in ``dearig.model.fitting.broyden``). It ends where the full
     cost no longer falls. ``held`` (d,) bool are parameters that are not fitted.
     """
     x, cost = start, float(problem.costs(start[None])[0])

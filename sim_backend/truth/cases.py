@@ -42,7 +42,7 @@ from dearig.sim_backend.truth.plant import TruthPlant
 
 __all__ = [
     "FORMS",
-    "HANDS",
+    "GENERATORS",
     "KINDS",
     "ROOM_FORMS",
     "SECOND_FORMS",
@@ -149,13 +149,13 @@ SECOND_FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
 )
 
 #: Whose forms a case has.
-HANDS: Mapping[str, Mapping[str, tuple[Draw, ...]]] = MappingProxyType(
+GENERATORS: Mapping[str, Mapping[str, tuple[Draw, ...]]] = MappingProxyType(
     {"first": FORMS, "second": SECOND_FORMS}
 )
 
 
-def _covered(hand: str) -> tuple[str, ...]:
-    return tuple(family for family in HANDS[hand] if family != UNKNOWN)
+def _covered(generator: str) -> tuple[str, ...]:
+    return tuple(family for family in GENERATORS[generator] if family != UNKNOWN)
 
 
 #: Probability of each kind of case.
@@ -171,8 +171,8 @@ _MODULI, _TIMES = 0.15, 0.20
 class TruthCase:
     """Hidden effects of the rig of ``seed``, in a film with its own ``network``.
 
-    ``hand`` is one of ``HANDS``, ``noise`` the kind of the laser's noise, one of ``NOISES``. For
-    tests and scores only: no program displays it.
+    ``generator`` is one of ``GENERATORS``, ``noise`` the kind of the
+    laser's noise, one of ``NOISES``. For tests and scores only: no program displays it.
     """
 
     seed: int
@@ -180,7 +180,7 @@ class TruthCase:
     load: Load
     effects: tuple[TruthEffect, ...]
     network: Network = TABLE_3
-    hand: str = "first"
+    generator: str = "first"
     noise: str = WHITE
 
     @property
@@ -211,9 +211,9 @@ class TruthCase:
         return float(np.sqrt(np.mean((hiding.displacement - plain.displacement) ** 2)))
 
     def of_one_run(
-        self, time: np.ndarray, voltage: np.ndarray, generator: np.random.Generator
+        self, time: np.ndarray, voltage: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
-        """Return the part (N,) m of the reading that belongs to the run of ``generator`` alone.
+        """Return the part (N,) m of the reading that belongs to the run of ``rng`` alone.
 
         No other run of the rig contains it. It is computed under ``voltage`` (N,) V at ``time``
         (N,) s.
@@ -221,7 +221,7 @@ class TruthCase:
         repeated = [effect for effect in self.effects if effect.redrawn is None]
         if len(repeated) == len(self.effects):
             return np.zeros_like(time)
-        run, _ = self.plant().renewed(generator).advance(time, voltage, True)
+        run, _ = self.plant().renewed(rng).advance(time, voltage, True)
         rest, _ = TruthPlant.at_rest(self._numbers(), repeated).advance(time, voltage, True)
         own: np.ndarray = run.displacement - rest.displacement
         return own
@@ -230,31 +230,31 @@ class TruthCase:
         return FilmNumbers.of(self.film, self.load, self.network)
 
 
-def _drawn_network(generator: np.random.Generator) -> Network:
+def _drawn_network(rng: np.random.Generator) -> Network:
     """Draw a network like that of Table 3, for another film of the same make."""
 
     def spring(of: Spring) -> Spring:
-        return Spring(of.modulus * np.exp(generator.normal(0.0, _MODULI)), of.limit, of.kind)
+        return Spring(of.modulus * np.exp(rng.normal(0.0, _MODULI)), of.limit, of.kind)
 
     return Network(
         spring(TABLE_3.equilibrium),
         tuple(
-            Branch(spring(b.spring), b.relaxation_time * np.exp(generator.normal(0.0, _TIMES)))
+            Branch(spring(b.spring), b.relaxation_time * np.exp(rng.normal(0.0, _TIMES)))
             for b in TABLE_3.branches
         ),
     )
 
 
-def _drawn_families(generator: np.random.Generator, kind: str, hand: str) -> list[str]:
+def _drawn_families(rng: np.random.Generator, kind: str, generator: str) -> list[str]:
     if kind == "any":
-        kind = str(generator.choice(list(KINDS), p=list(KINDS.values())))
+        kind = str(rng.choice(list(KINDS), p=list(KINDS.values())))
     if kind == "clean":
         return []
-    if kind in HANDS[hand] or kind in ROOM_FORMS:
+    if kind in GENERATORS[generator] or kind in ROOM_FORMS:
         return [kind]
     # in the order of the table, which is that of the signal path
-    covered = _covered(hand)
-    places = generator.choice(len(covered), size=2 if kind == "pair" else 1, replace=False)
+    covered = _covered(generator)
+    places = rng.choice(len(covered), size=2 if kind == "pair" else 1, replace=False)
     return [covered[place] for place in sorted(places)]
 
 
@@ -264,60 +264,65 @@ def draw(
     load: Load,
     kind: str = "any",
     *,
-    hand: str = "first",
+    generator: str = "first",
     noise: str = WHITE,
 ) -> TruthCase:
     """Return the case of ``seed``.
 
-    ``kind`` is ``any``, one of ``KINDS``, a family of the hand's forms, or one of ``ROOM_FORMS``:
-    what follows the air of the simulated room. Raises ``ValueError``
-    for any other. The film of a seed is the same for every kind, hand and noise.
+    ``kind`` is ``any``, one of ``KINDS``, a family of the generator's forms, or one of
+    ``ROOM_FORMS``: what follows the air of the simulated room. Raises ``ValueError`` for any other.
+    The film of a seed is the same for every kind, generator and noise.
 
-    ``hand`` ``"second"`` draws from ``SECOND_FORMS``: published laws that the model does not have,
-    under the same names of families. ``noise`` is one of ``NOISES``: what the laser adds.
+    ``generator`` ``"second"`` draws from ``SECOND_FORMS``: published laws that the model does not
+    have, under the same names of families. ``noise`` is one of ``NOISES``: what the laser adds.
     ``address_of`` gives the address at which the rig of a case can be opened.
     """
-    if hand not in HANDS:
-        raise ValueError(f"no hand {hand!r}: choose one of {', '.join(HANDS)}")
+    if generator not in GENERATORS:
+        raise ValueError(f"no generator {generator!r}: choose one of {', '.join(GENERATORS)}")
     if noise not in NOISES:
         raise ValueError(f"no noise {noise!r}: choose one of {', '.join(NOISES)}")
-    forms = {**HANDS[hand], **ROOM_FORMS}
+    forms = {**GENERATORS[generator], **ROOM_FORMS}
     if kind not in ("any", *KINDS, *forms):
-        offered = ", ".join(("any", *KINDS, *_covered(hand), *ROOM_FORMS))
+        offered = ", ".join(("any", *KINDS, *_covered(generator), *ROOM_FORMS))
         raise ValueError(f"no case of kind {kind!r}: choose one of {offered}")
-    generator = np.random.default_rng(seed)
-    network = _drawn_network(generator)
+    rng = np.random.default_rng(seed)
+    network = _drawn_network(rng)
     effects = []
-    for family in _drawn_families(generator, kind, hand):
-        form = forms[family][int(generator.integers(len(forms[family])))]
-        effects.append(form(generator, load))
-    return TruthCase(seed, film, load, tuple(effects), network, hand, noise)
+    for family in _drawn_families(rng, kind, generator):
+        form = forms[family][int(rng.integers(len(forms[family])))]
+        effects.append(form(rng, load))
+    return TruthCase(seed, film, load, tuple(effects), network, generator, noise)
 
 
-def address_of(seed: int, hand: str = "first", noise: str = WHITE) -> str:
+def address_of(seed: int, generator: str = "first", noise: str = WHITE) -> str:
     """Return the address of the rig with the case of ``seed``: ``sim:7``, ``sim:7:second:spikes``.
 
     What is not the default stands behind the seed, separated by colons.
     """
-    chosen = [hand] * (hand != "first") + [noise] * (noise != WHITE)
+    chosen = [generator] * (generator != "first") + [noise] * (noise != WHITE)
     return ":".join(("sim", str(seed), *chosen))
 
 
 def case_of(seed: int, words: Sequence[str], film: Film, load: Load) -> TruthCase:
-    """Return the case of ``seed`` with a hand, a noise and a kind given by ``words``.
+    """Return the case of ``seed`` with a generator, a noise and a kind given by ``words``.
 
     The kind is one of ``ROOM_FORMS``, or any. Raises ``ValueError`` for a word that is none of
     them, or for two of one sort.
     """
-    hands = [word for word in words if word in HANDS]
+    generators = [word for word in words if word in GENERATORS]
     noises = [word for word in words if word in NOISES]
     rooms = [word for word in words if word in ROOM_FORMS]
-    other = [word for word in words if word not in (*hands, *noises, *rooms)]
-    if other or max(len(hands), len(noises), len(rooms)) > 1:
+    other = [word for word in words if word not in (*generators, *noises, *rooms)]
+    if other or max(len(generators), len(noises), len(rooms)) > 1:
         raise ValueError(
-            f"behind the seed stand one of {', '.join(HANDS)}, one of {', '.join(NOISES)} and "
+            f"behind the seed stand one of {', '.join(GENERATORS)}, one of {', '.join(NOISES)} and "
             f"one of {', '.join(ROOM_FORMS)}, not {':'.join(words)}"
         )
     return draw(
-        seed, film, load, (*rooms, "any")[0], hand=(*hands, "first")[0], noise=(*noises, WHITE)[0]
+        seed,
+        film,
+        load,
+        (*rooms, "any")[0],
+        generator=(*generators, "first")[0],
+        noise=(*noises, WHITE)[0],
     )

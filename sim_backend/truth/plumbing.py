@@ -1,4 +1,4 @@
-"""How hidden effects are attached to a rig; both hands share it, and have laws of their own."""
+"""How hidden effects are attached to a rig; generators A and B share it, not their laws."""
 
 from __future__ import annotations
 

@@ -20,7 +20,6 @@ from dearig.errors import InputError, InstrumentFault, SafetyStop
 from dearig.model.control import HoldAnswer, HoldController
 from dearig.recording import open_recording
 from dearig.recording.reading.summary import describe_rows
-from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.rig import SimulatedRig
 
 RATE = 200.0
@@ -61,7 +60,7 @@ class Seen(RunObserver):
 
 
 def held(out: Path, *faults: str, feedback: Feedback = HOLD, observer=None) -> RunResult:
-    options = RunOptions(faults=FaultPlan.parse(faults))
+    options = RunOptions(faults=faults)
     return record(LOADED, "sim", RIG, out, options, feedback=feedback, observer=observer)
 
 

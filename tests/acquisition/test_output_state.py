@@ -19,7 +19,6 @@ from dearig.drivers.rig import Block
 from dearig.errors import DearigError, InstrumentFault, NotSafe, SafetyStop
 from dearig.output_state import Known, OutputState
 from dearig.recording import open_recording
-from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.rig import SimulatedRig
 from tests.tools.command import LOBE
 
@@ -30,7 +29,7 @@ class Wrapped:
     """The simulated rig, as the driver of another distribution may be: without ``zero_reading``."""
 
     def __init__(self, faults: tuple[str, ...] = ()) -> None:
-        rig = open_rig("sim", RigFile(), RunOptions(faults=FaultPlan.parse(faults)))
+        rig = open_rig("sim", RigFile(), RunOptions(faults=faults))
         assert isinstance(rig, SimulatedRig)
         self.inner = rig
         for name in ("identify", "load", "arm", "start", "read", "stop", "make_safe", "close"):
@@ -137,7 +136,7 @@ def test_a_finished_run_carries_the_reading_that_confirmed_zero_volts(
 
 
 def test_an_interlock_carries_it_too_and_the_recording_has_an_event(run, tmp_path: Path) -> None:
-    ended, _ = run(options=RunOptions(faults=FaultPlan.parse(("amplifier-trip@0.7",))))
+    ended, _ = run(options=RunOptions(faults=("amplifier-trip@0.7",)))
     assert isinstance(ended, SafetyStop)
     assert ended.output_state.confirmed
     assert f"info: output: {ended.output_state.sentence}" in messages(tmp_path)

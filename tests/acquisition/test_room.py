@@ -15,7 +15,6 @@ from dearig.drivers.instruments.thermohygrometer import RoomReading
 from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
 from dearig.errors import InstrumentFault, SafetyStop
 from dearig.recording.reading.reader import open_recording
-from dearig.sim_backend.faults import FaultPlan
 
 SINE = """
 name = "a slow sine"
@@ -89,7 +88,7 @@ def test_a_room_that_leaves_its_limits_ends_the_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("on_loss", ["go on", "ramp"])
 def test_a_sensor_that_is_lost_ends_the_run_only_by_choice(tmp_path: Path, on_loss: str) -> None:
-    options = RunOptions(faults=FaultPlan.parse(["room-sensor-gone@0.5+3"]))
+    options = RunOptions(faults=["room-sensor-gone@0.5+3"])
     file = rig_file(on_loss=on_loss)
     if on_loss == "ramp":
         with pytest.raises(SafetyStop, match="gave no value for 2 s"):
@@ -105,7 +104,7 @@ def test_a_sensor_that_is_lost_ends_the_run_only_by_choice(tmp_path: Path, on_lo
 
 
 def test_a_sensor_that_must_be_there_and_is_not_starts_nothing(tmp_path: Path) -> None:
-    options = RunOptions(faults=FaultPlan.parse(["room-sensor-gone@0"]))
+    options = RunOptions(faults=["room-sensor-gone@0"])
     with pytest.raises(InstrumentFault, match="gave no value"):
         record(SEQUENCE, "sim", rig_file(on_loss="ramp"), tmp_path / "run.h5", options)
     assert not (tmp_path / "run.h5").exists()

@@ -46,7 +46,6 @@ from dearig.output_state import OutputState
 from dearig.recording import open_recording
 from dearig.recording.writing.recorder import Recorder, is_writing
 from dearig.recording.writing.writer import RecordingWriter
-from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.rig import SimulatedRig
 from tests.tools.command import LOBE, dearig, names, write
 
@@ -65,7 +64,7 @@ class Troubled:
         self._trouble = trouble
         self._block = block
         self._blocks = 0
-        rig = open_rig("sim", RIG_FILE, RunOptions(faults=FaultPlan.parse(faults)))
+        rig = open_rig("sim", RIG_FILE, RunOptions(faults=faults))
         assert isinstance(rig, SimulatedRig)
         self.inner = rig
 
@@ -434,7 +433,7 @@ def test_an_observer_receives_every_sample_and_event(tmp_path: Path) -> None:
         record(LOADED, "sim", RIG_FILE, tmp_path / "a.h5", interrupts=interrupts)
     result = record(
         LOADED, "sim:3", RIG_FILE, tmp_path / "b.h5",
-        RunOptions(faults=FaultPlan.parse(["late-reply@0.2+0.1"])), observer=diary,
+        RunOptions(faults=["late-reply@0.2+0.1"]), observer=diary,
     )  # fmt: skip
     assert diary.samples == result.samples
     assert tuple(diary.events) == result.events

@@ -24,7 +24,6 @@ from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 from dearig.recording.reading.reader import open_recording
-from dearig.sim_backend.faults import FaultPlan
 
 PATH = """\
 name = "path"
@@ -193,7 +192,7 @@ def test_a_fault_keeps_what_was_done(tmp_path):
     with pytest.raises(SafetyStop):
         followed(
             tmp_path / "out", ended=kept.append,
-            options=RunOptions(faults=FaultPlan.parse(["arc@1.2"])),
+            options=RunOptions(faults=["arc@1.2"]),
         )  # fmt: skip
     (outcome,) = kept
     assert outcome.status == "stopped"

@@ -1,6 +1,6 @@
 """What each stage and each rule of the diagnosis earns: switched off in turn, on the same rigs.
 
-Run as ``python -m tests.benchmarks.bench_ablation [--first SEED] [--rigs N] [--hand second]
+Run as ``python -m tests.benchmarks.bench_ablation [--first SEED] [--rigs N] [--generator second]
 [--seeds 3,17] [--noise KIND] [--only NAME,...]``. Every rig is recorded once, as in the blind test,
 and diagnosed by the whole method and by each method with one thing less. A row says for how many
 rigs the first effect was of a hidden family (or nothing was named where nothing is hidden), for how
@@ -44,7 +44,7 @@ from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
 from dearig.sim_backend.laser_noise import NOISES, WHITE
-from dearig.sim_backend.truth.cases import HANDS
+from dearig.sim_backend.truth.cases import GENERATORS
 from tests.blind.play import Bench, Case, records_of
 from tests.blind.score import WITHIN
 
@@ -194,7 +194,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=90000, help="first seed [90000]")
     parser.add_argument("--rigs", type=int, default=100, help="how many rigs [100]")
     parser.add_argument("--seeds", help="these alone, such as 3,17")
-    parser.add_argument("--hand", choices=tuple(HANDS), default="first", help="[first]")
+    parser.add_argument("--generator", choices=tuple(GENERATORS), default="first", help="[first]")
     parser.add_argument("--noise", choices=NOISES, default=WHITE, help="[white]")
     parser.add_argument("--rate", type=float, default=200.0, help="Hz [200]")
     parser.add_argument("--only", help="names of variants beside the whole, with commas between")
@@ -216,7 +216,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(Path(folder), given.rate)
         for seed in seeds:
-            case = Case(seed, "thesis", given.hand, given.noise)
+            case = Case(seed, "thesis", given.generator, given.noise)
             outcomes, kept = _played(bench, case, Path(folder) / str(seed), variants)
             for name, outcome in outcomes.items():
                 found[name].append(outcome)
@@ -261,7 +261,7 @@ def _kept(case: Case, end: Conclusion) -> dict[str, Any]:
     judge, found = end.judge, end.found
     return {
         "seed": case.seed,
-        "hand": case.hand,
+        "hand": case.generator,
         "noise": case.noise,
         "hidden": list(case.truth.families),
         "status": found.status,

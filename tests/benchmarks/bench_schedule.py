@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.batch.engines import LocalEngine
-from dearig.batch.fits import StudyOptions, Subject, Task, fit_task
+from dearig.batch.fits import FitTask, StudyOptions, Subject, fit_task
 from dearig.batch.studies import study_recordings, subjects_of
 from tests.benchmarks.bench_study import made, nothing
 from tests.tools.machine import cores_and_load
@@ -64,11 +64,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as made_folder, chdir(made_folder):
         folder = Path(made_folder)
         subjects = subjects_of([made(folder, asked.fits)], folder / "out")
-        fit_task(Task("warm", subjects[0].path, "", options))
+        fit_task(FitTask("warm", subjects[0].path, "", options))
         times = []
         for subject in subjects:
             began = time.process_time()
-            row = fit_task(Task(subject.name, subject.path, "", options))
+            row = fit_task(FitTask(subject.name, subject.path, "", options))
             times.append(time.process_time() - began)
             assert row["state"] == "ok", row["reason"]
         size = float(np.mean([subject.path.stat().st_size for subject in subjects]))

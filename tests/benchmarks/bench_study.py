@@ -35,7 +35,7 @@ import psutil
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.identify import identify_recordings
 from dearig.batch.engines import LocalEngine, engine_at
-from dearig.batch.fits import Row, StudyOptions, Task, fit_task
+from dearig.batch.fits import FitTask, Row, StudyOptions, fit_task
 from dearig.batch.numbers import parameters_of
 from dearig.batch.studies import study_recordings, subjects_of
 from dearig.batch.table_file import read_table
@@ -58,7 +58,7 @@ def made(folder: Path, count: int) -> Path:
     return recordings
 
 
-def nothing(task: Task) -> Row:
+def nothing(task: FitTask) -> Row:
     return {"recording": task.name, "state": "ok", "reason": "", "sha256": "", "value": 1.0}
 
 
@@ -274,7 +274,7 @@ def main() -> None:
         folder = Path(made_folder)
         subjects = subjects_of([made(folder, count)], folder / "out")
         began = time.process_time()
-        alone = [fit_task(Task(s.name, s.path, "", options)) for s in subjects]
+        alone = [fit_task(FitTask(s.name, s.path, "", options)) for s in subjects]
         each = (time.process_time() - began) / count
         began = time.process_time()
         many = [type(subjects[0])(f"{i}", subjects[i % count].path) for i in range(empty)]

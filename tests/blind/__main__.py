@@ -4,7 +4,7 @@
     python -m tests.blind --cases 10 --clean 0 --train thesis
     python -m tests.blind --cases 0 --clean 0 --per-family 4
     python -m tests.blind --seeds 17,41      these alone
-    python -m tests.blind --hand second      laws that neither the library nor generator A has
+    python -m tests.blind --generator second      laws that neither the library nor generator A has
     python -m tests.blind --cases 0 --clean 20 --noise coarse
     python -m tests.blind --table            the table of what is there
 
@@ -30,7 +30,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from dearig.errors import DearigError
 from dearig.sim_backend.laser_noise import NOISES, WHITE
-from dearig.sim_backend.truth.cases import HANDS
+from dearig.sim_backend.truth.cases import GENERATORS
 from tests.blind.play import MODES, Bench, Case, case_of
 from tests.blind.score import Score, score
 from tests.blind.seeds import LOOKED_AT, chosen
@@ -42,9 +42,9 @@ def main() -> None:
     modes = tuple(MODES) if given.train == "both" else (given.train,)
     bench = Bench(given.out, given.rate, given.bare)
     seeds = given.seeds or chosen(
-        given.first, given.cases, given.clean, given.per_family, given.hand
+        given.first, given.cases, given.clean, given.per_family, given.generator
     )
-    wanted = [Case(seed, mode, given.hand, given.noise) for mode in modes for seed in seeds]
+    wanted = [Case(seed, mode, given.generator, given.noise) for mode in modes for seed in seeds]
     console = Console(stderr=True)
     if given.table:
         _print(bench, None, given.keep, console)
@@ -126,7 +126,12 @@ def _arguments() -> argparse.Namespace:
     add("--clean", type=_natural, default=50, help="further rigs that hide nothing [50]")
     add("--per-family", type=_natural, default=0, help="further rigs of each family [0]")
     add("--seeds", type=_seeds, help="these seeds and no others, such as 3,17")
-    add("--hand", choices=tuple(HANDS), default="first", help="who draws the effects [first]")
+    add(
+        "--generator",
+        choices=tuple(GENERATORS),
+        default="first",
+        help="who draws the effects [first]",
+    )
     add("--noise", choices=NOISES, default=WHITE, help="noise of the laser [white]")
     add("--train", choices=(*MODES, "both"), default="both", help="training recordings [both]")
     add("--rate", type=float, choices=(100.0, 200.0, 1000.0), default=200.0, help="Hz [200]")

@@ -73,22 +73,22 @@ def sources_digest() -> str:
 
 @dataclass(frozen=True)
 class Case:
-    """One seed in one mode, its effect drawn by a hand, its laser with a kind of noise."""
+    """One seed in one mode, its effect drawn by a generator, its laser with a kind of noise."""
 
     seed: int
     mode: str
-    hand: str = "first"
+    generator: str = "first"
     noise: str = WHITE
 
     @property
     def truth(self) -> TruthCase:
         """What its rig hides."""
-        return drawn(self.seed, self.hand, self.noise)
+        return drawn(self.seed, self.generator, self.noise)
 
     @property
     def address(self) -> str:
         """Address of its rig."""
-        return address_of(self.seed, self.hand, self.noise)
+        return address_of(self.seed, self.generator, self.noise)
 
 
 def case_of(result: Mapping[str, Any]) -> Case:
@@ -178,7 +178,7 @@ class Bench:
         result = {
             "seed": case.seed,
             "mode": case.mode,
-            "hand": case.hand,
+            "hand": case.generator,
             "noise": case.noise,
             "sources": sources,
             "floor_um": self.floor_um(case.noise),

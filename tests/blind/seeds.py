@@ -8,7 +8,7 @@ from itertools import count
 from dearig.config.rigfile import RigFile
 from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.truth import cases
-from dearig.sim_backend.truth.cases import HANDS, UNKNOWN, TruthCase
+from dearig.sim_backend.truth.cases import GENERATORS, UNKNOWN, TruthCase
 
 __all__ = [
     "CLEAN_FROM",
@@ -38,30 +38,30 @@ LOOKED_AT = frozenset(
 _RIG = RigFile()
 
 
-def drawn(seed: int, hand: str = "first", noise: str = WHITE) -> TruthCase:
-    """What the rig ``sim:seed`` hides, or that of another hand or noise."""
-    return cases.draw(seed, _RIG.as_film(), _RIG.as_load(), hand=hand, noise=noise)
+def drawn(seed: int, generator: str = "first", noise: str = WHITE) -> TruthCase:
+    """What the rig ``sim:seed`` hides, or that of another generator or noise."""
+    return cases.draw(seed, _RIG.as_film(), _RIG.as_load(), generator=generator, noise=noise)
 
 
-def clean_seeds(number: int, hand: str = "first") -> list[int]:
+def clean_seeds(number: int, generator: str = "first") -> list[int]:
     """The first ``number`` seeds from ``CLEAN_FROM`` on whose rig hides nothing."""
-    return _first(number, (), hand)
+    return _first(number, (), generator)
 
 
-def family_seeds(family: str, number: int, hand: str = "first") -> list[int]:
+def family_seeds(family: str, number: int, generator: str = "first") -> list[int]:
     """The first ``number`` seeds from ``FAMILY_FROM`` on whose rig hides this family alone."""
-    return _first(number, (family,), hand)
+    return _first(number, (family,), generator)
 
 
 def chosen(
-    first: int, any_kind: int, clean: int, per_family: int, hand: str = "first"
+    first: int, any_kind: int, clean: int, per_family: int, generator: str = "first"
 ) -> list[int]:
     """Every seed to be played once, in the order of playing."""
     seeds = [*range(first, first + any_kind)]
     if per_family:
-        for family in HANDS[hand]:
-            seeds += family_seeds(family, per_family, hand)
-    return list(dict.fromkeys([*seeds, *clean_seeds(clean, hand)]))
+        for family in GENERATORS[generator]:
+            seeds += family_seeds(family, per_family, generator)
+    return list(dict.fromkeys([*seeds, *clean_seeds(clean, generator)]))
 
 
 def kind_of(families: tuple[str, ...]) -> str:
@@ -73,11 +73,11 @@ def kind_of(families: tuple[str, ...]) -> str:
     return "covered" if len(families) == 1 else "pair"
 
 
-def _first(number: int, families: tuple[str, ...], hand: str) -> list[int]:
+def _first(number: int, families: tuple[str, ...], generator: str) -> list[int]:
     start = FAMILY_FROM if families else CLEAN_FROM
-    hits = _hiding(start, families, hand)
+    hits = _hiding(start, families, generator)
     return [next(hits) for _ in range(number)]
 
 
-def _hiding(start: int, families: tuple[str, ...], hand: str) -> Iterator[int]:
-    return (seed for seed in count(start) if drawn(seed, hand).families == families)
+def _hiding(start: int, families: tuple[str, ...], generator: str) -> Iterator[int]:
+    return (seed for seed in count(start) if drawn(seed, generator).families == families)

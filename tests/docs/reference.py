@@ -20,6 +20,11 @@ from typer.main import get_command
 from dearig.cli.main import app
 from dearig.config import sequence_example
 from dearig.config.rigfile import write_default
+from dearig.formulas import as_text
+from dearig.model.effects import EFFECTS, FAMILIES, ORIGINS, Effect
+from dearig.model.effects.registry import OURS
+from dearig.report.text.diagnosis import family_label
+from dearig.report.text.laws import other_symbols, parameter_meanings
 
 FOLDER = Path(__file__).parents[2] / "app" / "docs" / "reference"
 
@@ -38,6 +43,15 @@ answered with one sentence. An unexpected error names the log file that has its 
 `dearig --version` prints the version, `dearig --install-completion` lets the shell complete
 commands and options, and `-v` shows more messages. Exit codes and the documents of `--json` are on
 the page [JSON](json.md).
+"""
+_EFFECTS = """\
+# Effects and their laws
+
+Made from the code by `python -m tests.docs.reference`; `dearig effects` lists the same, and
+`dearig effects "dry friction"` prints one. These are the effects that the
+[diagnosis](../explanation/diagnosis.md) knows. Values are in SI units. An effect vanishes where
+its amplitudes, the first parameters, are neutral. [Add an
+effect](../../../model/effects/README.md) says how one more is added.
 """
 _RIG_FILE = """\
 # Rig file
@@ -65,8 +79,40 @@ def rig_file() -> str:
         return f"{_RIG_FILE}```toml\n{path.read_text(encoding='utf-8').rstrip()}\n```\n"
 
 
+def effects() -> str:
+    """The page of the effects: equations, symbols, parameters and source of each."""
+    ours = [e for e in EFFECTS.values() if ORIGINS[e.name] == OURS]
+    parts = [_EFFECTS]
+    for family in FAMILIES:
+        members = sorted((e for e in ours if e.family == family), key=lambda e: e.name.lower())
+        parts += [f"## Family: {family_label(family)}\n"] if members else []
+        parts += [_effect(e) for e in members]
+    return "\n".join(parts)
+
+
+def _effect(effect: Effect) -> str:
+    assert effect.law is not None
+    about = f"{effect.summary[:1].upper()}{effect.summary[1:]}. It acts on the {effect.acts_on}."
+    lines = [f"### {effect.name[:1].upper()}{effect.name[1:]}", about]
+    lines += [f"```math\n{equation}\n```" for equation in effect.law.equations]
+    rows = ["| symbol | parameter | meaning | unit | from | to |", "|---|---|---|---|---|---|"]
+    rows += [
+        f"| `{as_text(symbol)}` | `{p.name}` | {_escaped(name)} {_escaped(meaning)} | {unit} "
+        f"| {p.bounds[0]:g} | {p.bounds[1]:g} |"
+        for (symbol, name, meaning, unit), p in zip(
+            parameter_meanings(effect), effect.parameters, strict=True
+        )
+    ]
+    lines.append("\n".join(rows))
+    others = "; ".join(f"`{as_text(s)}` {meaning}" for s, meaning in other_symbols(effect))
+    lines += [f"{others}."] if others else []
+    lines.append(f"Source: {effect.law.source}.")
+    return "\n\n".join(lines) + "\n"
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "commands.md": commands,
+    "effects.md": effects,
     "rig-file.md": rig_file,
     "sequences.md": sequence_example.page,
 }

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dearig.analysis.study import Residual, Study, Task, Trace
+from dearig.analysis.study import Residual, Study, StudyRequest, Trace
 from dearig.errors import InputError
 from dearig.report.study_file import FORMAT, open_study, save_study, studies_in
 from dearig.report.study_view import view_of
 from tests.tools.diagnosis import diagnose_outcome, film_diagnosis, finding, nothing_missing
 from tests.tools.reports import identify_outcome
 
-TASK = Task(diagnose=True, train=(Path("train.h5"),), validation=())
+TASK = StudyRequest(diagnose=True, train=(Path("train.h5"),), validation=())
 
 
 def residuals() -> tuple[Residual, ...]:

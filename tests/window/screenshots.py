@@ -166,7 +166,7 @@ def views(window: MainWindow) -> Iterator[str]:
     yield "study"
     study.recordings.check([folder / "thesis-004.h5"], [folder / "a-0.6-001.h5"])
     study.begin()
-    until(lambda: study.bar.value() > 250, "the search")
+    until(lambda: study.job.bar.value() > 250, "the search")
     yield "study-searching"
     until(lambda: study._shown is not None or bool(study.message.text()), "the diagnosis")
     if study.message.text():

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from dearig.config.toml_input import Table
+from dearig.config.toml_input import TomlTable
 from dearig.model.simulation.excitation import Segment
 
 __all__ = ["KV", "SEGMENTS_MAX", "Positive", "SegmentTable", "Voltage", "in_volts"]
@@ -25,7 +25,7 @@ Voltage = Annotated[float, Field(ge=-1e3, le=1e3)]
 Positive = Annotated[float, Field(gt=0.0)]
 
 
-class SegmentTable(Table, ABC):
+class SegmentTable(TomlTable, ABC):
     """Keys of one ``[[segment]]``; a subclass is a kind.
 
     A subclass gives ``kind`` the type ``Literal["name"]``, adds its keys as fields (unit at the end

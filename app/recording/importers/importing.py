@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,10 +18,10 @@ from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
 from dearig.recording.files import check_output, file_sha256
 from dearig.recording.importers.columns.choose import choose
-from dearig.recording.importers.columns.chosen import Chosen, command_line
+from dearig.recording.importers.columns.chosen import HOLE, UNIT_HOLE, Chosen, command_line
 from dearig.recording.importers.columns.plausible import doubts
+from dearig.recording.importers.columns.proposal import first_values
 from dearig.recording.importers.columns.specimen import Specimen
-from dearig.recording.importers.columns.unsure import UnsureError, question
 from dearig.recording.importers.columns.values import Values, values_of
 from dearig.recording.importers.exported import exported
 from dearig.recording.importers.quantities.units import Scale
@@ -29,7 +29,14 @@ from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import NeedsOptionError
 from dearig.recording.writing.save import save_recording
 
-__all__ = ["ImportOptions", "Imported", "Prepared", "UnsureError", "import_file", "prepare"]
+__all__ = [
+    "ImportOptions",
+    "Imported",
+    "Prepared",
+    "UnsureError",
+    "import_file",
+    "prepare",
+]
 
 #: Parts of the time of an import at which the file is open, the numbers are read, and the checks
 #: are done: a text of three million rows takes as long.
@@ -145,7 +152,7 @@ def import_file(
     try:
         found = prepare(path, options, metadata=metadata, progress=part(progress, 0.0, WRITING))
     except UnsureError as error:
-        raise InputError(question(error, path, out, options.columns, _typed(options))) from error
+        raise InputError(_question(error, path, out, options.columns, _typed(options))) from error
     except NeedsOptionError as error:
         more = [*_typed(options), *error.words]
         line = command_line(path, out, options.columns, options.table, more)
@@ -334,3 +341,45 @@ def _events(values: Values, exported_before: tuple[Event, ...]) -> list[Event]:
         shown = ", ".join(places[:5]) + (f" and {len(places) - 5} more" if len(places) > 5 else "")
         found.append(Event(min(sample, last), "warning", f"left out before this sample: {shown}"))
     return sorted(found, key=lambda event: event.sample)
+
+
+_TABLE_HOLE, _FACTOR = "TABLE", "*FACTOR"
+
+
+class UnsureError(InputError):
+    """It is not sure which columns are ``chosen`` for what."""
+
+    def __init__(self, chosen: Chosen) -> None:
+        super().__init__(
+            f"{chosen.source.path}: it is not sure what its columns are "
+            f"({'; '.join(chosen.unsure)})"
+        )
+        self.chosen = chosen
+
+
+def _question(
+    error: UnsureError, path: Path, out: Path, given: Mapping[str, str], more: Sequence[str]
+) -> str:
+    """Return the message for ``error``: what is not sure, first values, and a command to complete.
+
+    ``given`` are the columns that the user named, ``more`` further words of the command line.
+    """
+    chosen = error.chosen
+    if chosen.table_choices:
+        line = command_line(path, out, given, _TABLE_HOLE, more)
+        return f"{error}. Put one of them for {_TABLE_HOLE}, and run: {line}"
+    pairs = chosen.template
+    holes = [
+        hole for hole, is_there in (
+            (HOLE, HOLE in pairs.values()),
+            (UNIT_HOLE, any(name.endswith(f"_{UNIT_HOLE}") for name in pairs)),
+            (_FACTOR[1:], any(column.endswith(_FACTOR) for column in pairs.values())),
+        ) if is_there
+    ]  # fmt: skip
+    line = command_line(path, out, pairs, chosen.table, more)
+    if not holes:
+        return f"{error}. If this is right, or after correcting it, run: {line}"
+    return (
+        f"{error}. The columns begin with {first_values(chosen)}. Put what is right for "
+        f"{' and '.join(holes)}, and run: {line}"
+    )

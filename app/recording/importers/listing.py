@@ -22,7 +22,7 @@ from dearig.recording.importers.quantities.units import Scale
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import Source, part_of, printable
 
-__all__ = ["ColumnPreview", "Content", "Guessed", "Proposal", "content_of", "preview"]
+__all__ = ["ColumnGuesses", "ColumnPreview", "Content", "Guessed", "content_of", "preview"]
 
 _SHOWN = 5  # values of each column
 #: Tables of a file for which columns are proposed.
@@ -63,7 +63,7 @@ class Guessed:
 
 
 @dataclass(frozen=True)
-class Proposal:
+class ColumnGuesses:
     """Guesses for the columns of one table, by number, and what is not sure of them.
 
     ``signature`` is the same for tables of the same layout, names and units; ``numbers`` are those
@@ -87,7 +87,7 @@ class Content:
 
     path: Path
     columns: tuple[ColumnPreview, ...]
-    proposals: Mapping[str, Proposal]
+    proposals: Mapping[str, ColumnGuesses]
     table: str | None
     is_text: bool = False
     told: Specimen = field(default_factory=Specimen)
@@ -144,7 +144,7 @@ def _taken(source: Source, raw: Mapping[str, Scale]) -> str | None:
 
 def _proposal(
     source: Source, table: str | None, raw: Mapping[str, Scale], numbers: Mapping[str, int]
-) -> Proposal:
+) -> ColumnGuesses:
     tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
     names = list(source.names if table is None else tables[table])
     of_table = source if table is None else part_of(source, names)
@@ -153,10 +153,10 @@ def _proposal(
     try:
         chosen = choose(of_table, {}, raw, timed=False)
     except InputError as error:
-        return Proposal({}, places, digest, (str(error),))
+        return ColumnGuesses({}, places, digest, (str(error),))
     if chosen.table is not None:  # the columns of a table are proposed with that table
-        return Proposal({}, places, digest)
-    return Proposal(
+        return ColumnGuesses({}, places, digest)
+    return ColumnGuesses(
         _guesses(chosen, numbers), places, digest, tuple(chosen.unsure), tuple(chosen.notes)
     )
 

@@ -14,7 +14,8 @@ from dearig.report.figures import diagnosis as drawn
 from dearig.report.figures.recordings import comparison_figure
 from dearig.report.figures.residual import bin_text, residual_panels
 from dearig.report.pages.head import head_of, origins_of
-from dearig.report.pages.html import Picture, picture, prefixes, write_page
+from dearig.report.pages.html import Picture, fitted_rows, picture, prefixes, write_page
+from dearig.report.pages.laws import LawView, law_view
 from dearig.report.text.diagnosis import (
     before_after_table,
     dropped_effects,
@@ -22,6 +23,7 @@ from dearig.report.text.diagnosis import (
     family_label,
     headline,
     rankings,
+    signatures_of,
     step_label,
     step_table,
     summary,
@@ -48,7 +50,7 @@ _VALIDATION_MAX = 6
 
 
 @dataclass(frozen=True)
-class Group:
+class RecordSection:
     """Section of one recording: sentences, wide figures, small figures."""
 
     name: str
@@ -64,6 +66,7 @@ class FoundEffect:
     title: str
     about: str
     evidence: tuple[str, ...]
+    law: LawView | None = None
     curves: tuple[Picture, ...] = ()
 
 
@@ -81,8 +84,8 @@ class DiagnosisPage:
     steps: tuple[FoundEffect, ...]
     effects: Table
     unnamed: tuple[str, ...]
-    residuals: tuple[Group, ...]
-    missing: tuple[Group, ...]
+    residuals: tuple[RecordSection, ...]
+    missing: tuple[RecordSection, ...]
     rankings: tuple[tuple[Table, Table], ...]
     dropped_effects: str
     after: tuple[tuple[str, tuple[str, ...]], ...]
@@ -137,7 +140,8 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
             ),
         )
     experiments = experiment_table(outcome)
-    worst = sorted(finding.before, key=lambda s: -s.rms / s.noise)[:_DRAWN_MAX]
+    before_it, after_it = signatures_of(outcome)
+    worst = sorted(before_it, key=lambda s: -s.rms / s.noise)[:_DRAWN_MAX]
     return DiagnosisPage(
         headline=headline(outcome),
         summary=summary(outcome),
@@ -159,7 +163,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         dropped_effects=_capitalised(dropped_effects(outcome)),
         after=tuple(
             (s.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in s.words))
-            for s in finding.after
+            for s in after_it
         ),
         after_pictures=_after_pictures(outcome, worst, names),
         experiment_words=readable(_with_full_stop(outcome.experiment_words)),
@@ -196,6 +200,7 @@ def _steps(outcome: DiagnoseOutcome, names: Iterator[str]) -> tuple[FoundEffect,
                 _capitalised(step_label(step)),
                 _capitalised(about),
                 (*(readable(_with_full_stop(_capitalised(w))) for w in step.evidence), *against),
+                law_view(EFFECTS[step.effect]),
                 curves,
             )
         )
@@ -229,9 +234,9 @@ def _unnamed(outcome: DiagnoseOutcome) -> tuple[str, ...]:
 
 def _residual(
     before: Signature, outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
-) -> Group:
+) -> RecordSection:
     kind = outcome.kind
-    after = _same(outcome.finding.after, before.record) if changed else None
+    after = _same(signatures_of(outcome)[1], before.record) if changed else None
     words = [
         *before.words,
         f"the correlation time of the residual is {_duration(before.correlation_time)}; noise "
@@ -262,14 +267,14 @@ def _residual(
         )
         for d in before.dependences
     )
-    return Group(
+    return RecordSection(
         before.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in words), wide, small
     )
 
 
 def _missing(
     missing: MissingStress, outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
-) -> Group:
+) -> RecordSection:
     after = _same(outcome.finding.missing_after, missing.record) if changed else None
     size = math.sqrt(float(np.mean(missing.stress**2)))
     what = "Maxwell stress" if outcome.kind == "actuator" else "measured stress"
@@ -293,7 +298,7 @@ def _missing(
         picture(figure, names, f"Missing stress before, against {name}.")
         for name, figure in drawn.missing_figures(missing, outcome.kind)
     )
-    return Group(missing.record, tuple(words), wide, small)
+    return RecordSection(missing.record, tuple(words), wide, small)
 
 
 def _validation_pictures(
@@ -342,11 +347,8 @@ def _after_pictures(
 
 def _provenance(outcome: DiagnoseOutcome) -> tuple[tuple[str, tuple[str, ...]], ...]:
     finding = outcome.finding
-    every = (*outcome.after.train, *outcome.after.validation)
     rows = [
-        ("Fitted to", tuple(c.name for c in outcome.after.train)),
-        ("Validated on", tuple(c.name for c in outcome.after.validation) or ("no recording",)),
-        ("Samples", (f"{sum(c.errors.samples for c in every):,}",)),
+        *fitted_rows(outcome.after.train, outcome.after.validation),
         ("Driven by", (f"voltage {outcome.drive}" if outcome.kind == "actuator" else "stretch",)),
         ("Baseline", (describe_model(finding.baseline.model),)),
         ("Model", (describe_model(finding.final.model),)),

@@ -50,6 +50,7 @@ if TYPE_CHECKING:  # jinja2 and matplotlib are loaded by the command that writes
 
 __all__ = [
     "Picture",
+    "fitted_rows",
     "picture",
     "prefixes",
     "write_demo_report",
@@ -274,7 +275,6 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
                 "(BIC) of the training data, against the number of branches.",
             ),
         )
-    every = (*outcome.train, *outcome.validation)
     over = pooled_over_noise(outcome.train)
     return Part(
         title=outcome.title,
@@ -290,9 +290,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         pictures=tuple(pictures),
         residuals=tuple((c.name, _residual_pictures(c, prefixes)) for c in outcome.train),
         provenance=(
-            ("Fitted to", tuple(c.name for c in outcome.train)),
-            ("Validated on", tuple(c.name for c in outcome.validation) or ("no recording",)),
-            ("Samples", (f"{sum(c.errors.samples for c in every):,}",)),
+            *fitted_rows(outcome.train, outcome.validation),
             ("Model", (describe_model(fit.model),)),
             ("Model file", (outcome.model_path or "not written",)),
             ("Method", (outcome.method,)),
@@ -390,6 +388,19 @@ def _comparison_pictures(
             caption = f"{name}: nominal stress against stretch."
             pictures.append(picture(loop_figure(c), prefixes, caption))
     return tuple(pictures)
+
+
+def fitted_rows(
+    train: Sequence[Comparison], validation: Sequence[Comparison]
+) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return rows on which recordings and how many of their samples were fitted and validated."""
+    fitted, others = (f"{sum(c.errors.samples for c in some):,}" for some in (train, validation))
+    return (
+        ("Fitted to", tuple(c.name for c in train)),
+        ("Samples fitted", (fitted,)),
+        ("Validated on", tuple(c.name for c in validation) or ("no recording",)),
+        ("Samples validated", (others,)),
+    )
 
 
 def _residual_pictures(comparison: Comparison, prefixes: Iterator[str]) -> tuple[Picture, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,9 +17,10 @@ from dearig.report.text.tables import Row, Table
 from dearig.units import SHOWN, readable
 
 if TYPE_CHECKING:
-    from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
+    from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, Evaluation
     from dearig.model.diagnosis.results import Round, Step
     from dearig.model.readings.measures import Errors
+    from dearig.model.residual import Signature
 
 __all__ = [
     "HEADLINES",
@@ -30,6 +32,7 @@ __all__ = [
     "pooled_errors",
     "ranking_table",
     "rankings",
+    "signatures_of",
     "step_label",
     "step_table",
     "summary",
@@ -83,6 +86,40 @@ def pooled_errors(comparisons: Sequence[Comparison]) -> Errors | None:
         e_m_thesis_pct=per_cent(largest, float(model_span)),
         samples=sum(c.errors.samples for c in comparisons),
     )
+
+
+def signatures_of(
+    outcome: DiagnoseOutcome,
+) -> tuple[tuple[Signature, ...], tuple[Signature, ...]]:
+    """Return the residuals before and after, with the errors that every table has.
+
+    A residual of the search is that of its fit, which has a zero of its own for each recording: two
+    numbers for one error.
+    """
+    found = outcome.finding
+    return _as_tabled(found.before, outcome.before, outcome.kind), _as_tabled(
+        found.after, outcome.after, outcome.kind
+    )
+
+
+def _as_tabled(
+    signatures: Sequence[Signature], stand: Evaluation, kind: str
+) -> tuple[Signature, ...]:
+    compared, shown = {c.name: c for c in stand.train}, SHOWN[kind]
+    told = []
+    for s in signatures:
+        c = compared.get(s.record)
+        if c is None or not c.noise:
+            told.append(s)
+            continue
+        rms, noise = (significant(v * shown.error_factor) for v in (c.errors.rms, c.noise))
+        size = (
+            f"{rms} {shown.suffix} RMS, {significant(c.errors.rms / c.noise)} times the noise "
+            f"floor of {noise} {shown.suffix}"
+        )
+        size += ": only noise is left" if s.is_noise else ""
+        told.append(replace(s, rms=c.errors.rms, noise=c.noise, words=(size, *s.words[1:])))
+    return tuple(told)
 
 
 # sentences
@@ -151,6 +188,7 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
         )
     if outcome.few_data:
         said.append(few_data_text(outcome.few_data))
+    said += _sureness(outcome)
     said += _undetermined(outcome)
     said += _events(outcome)
     said += [_rivals_text(step) for step in finding.steps if step.indistinguishable_from]
@@ -173,10 +211,12 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
     reasons, shown = outcome.judgement.reasons, SHOWN[outcome.kind]
     baseline, final = outcome.finding.baseline, outcome.finding.final
     if "validation" in reasons:
+        # the number of the table; the bound of the noise decides alone whether it is more
         left = [
-            f"{c.name} keeps {significant(over, 2)} times its noise"
+            f"{c.name} keeps {significant(c.steady_rms / (c.noise or outcome.noise))} times its "
+            f"noise{_without_own(c)}"
             for c in outcome.after.validation
-            if (over := c.over_noise(outcome.noise)) > TOLERANCE
+            if c.over_noise(outcome.noise) > TOLERANCE
         ]
         left += [f"the model cannot follow {name}" for name in outcome.not_compared]
         yield (
@@ -200,8 +240,8 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
         )
     if "training" in reasons:
         left = [
-            f"{s.record} keeps {significant(s.rms / s.noise, 2)} times its noise"
-            for s in outcome.finding.after
+            f"{s.record} keeps {significant(told.rms / told.noise)} times its noise"
+            for s, told in zip(outcome.finding.after, signatures_of(outcome)[1], strict=True)
             if s.rms / s.noise > TOLERANCE
         ]
         yield f"Not every training recording is explained: {listed(left)}."
@@ -211,6 +251,11 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
             f"The readings of {moving} move slowly before the voltage. What moves there counts as "
             f"noise, and was not found; effects that are smaller are hidden by it."
         )
+
+
+def _without_own(comparison: Comparison) -> str:
+    own = comparison.rms_without_events is not None
+    return " without slow noise, drift and events of its own" if own else ""
 
 
 def _verdict(outcome: DiagnoseOutcome) -> str:
@@ -308,11 +353,17 @@ def _error_change(
     )
 
 
+def _sureness(outcome: DiagnoseOutcome) -> list[str]:
+    """Return how probable each family of the effects found is, where that is known."""
+    known, families = outcome.marginals, dict.fromkeys(s.family for s in outcome.finding.steps)
+    said = "The probability that {} is among what is missing is {:.2f}."
+    return [said.format(family_label(f), known.get(f, 0.0)) for f in families if known]
+
+
 def _undetermined(outcome: DiagnoseOutcome) -> Iterator[str]:
     """Yield a sentence on the parameters that the data do not determine; none if there are none."""
-    open_ones = [e.name for e in outcome.finding.final.estimates if e.free and not e.determined]
-    if open_ones:
-        yield undetermined_names_text(open_ones)
+    if weak := [e.name for e in outcome.finding.final.estimates if e.free and not e.determined]:
+        yield undetermined_names_text(weak)
 
 
 def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
@@ -444,7 +495,7 @@ def step_table(outcome: DiagnoseOutcome) -> Table:
             Row(
                 (
                     name,
-                    significant(stage.train_rms * shown.error_factor),
+                    significant(pooled_rms(stand.train) * shown.error_factor),
                     significant(stage.selection_rms * shown.error_factor),
                     NO_VALUE if errors is None else significant(errors.rms * shown.error_factor),
                     NO_VALUE if errors is None else significant(errors.rms / noise),

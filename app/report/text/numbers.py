@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 
+from dearig.formulas import ASCII
+
 __all__ = [
     "NO_VALUE",
     "interval",
@@ -30,6 +32,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", _RAISED)
 _SUBSCRIPT = str.maketrans("0123456789", _LOWERED)
 _PLAIN = str.maketrans(
     {
+        **ASCII,
         "\N{MICRO SIGN}": "u",
         "\N{GREEK SMALL LETTER MU}": "mu",
         _TIMES: "x",

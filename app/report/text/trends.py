@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from dearig.batch.trend import VERDICTS, Change, Effect, Trend
+from dearig.batch.trend import VERDICTS, ChangePoint, Trend, TrendSlope
 from dearig.batch.trends import Trends
 from dearig.report.text.numbers import interval, quoted, significant, symbol
 from dearig.report.text.tables import Row, Table
@@ -144,7 +144,7 @@ def _at_once(trends: Trends) -> Iterator[str]:
         )
 
 
-def _effect_text(trend: Trend, effect: Effect) -> str:
+def _effect_text(trend: Trend, effect: TrendSlope) -> str:
     per = _per(effect)
     low, high = sorted((effect.low, effect.high))
     size = f"{_signed(effect.slope, effect)} {_unit(trend)} {per} (95 %: {interval_of(low, high)})"
@@ -164,7 +164,7 @@ def _effect_text(trend: Trend, effect: Effect) -> str:
     return f"{name}: films differ{told}; their mean is {size}."
 
 
-def _change_text(trend: Trend, change: Change) -> str:
+def _change_text(trend: Trend, change: ChangePoint) -> str:
     when = f" ({change.started[:16].replace('T', ' ')})" if change.started else ""
     return (
         f"Film {change.film or 'without a name'}: {number_name(trend.name, unit=False)} jumps by "
@@ -180,7 +180,7 @@ def interval_of(low: float, high: float) -> str:
     return f"{significant(low, 2)} to {significant(high, 2)}"
 
 
-def _signed(value: float, effect: Effect) -> str:
+def _signed(value: float, effect: TrendSlope) -> str:
     text = quoted(value, *sorted((effect.low, effect.high)))
     return text if value < 0.0 else f"+{text}"
 
@@ -198,7 +198,7 @@ def number_name(column: str, unit: bool = True) -> str:
     return f"{shown} ({of})" if of and unit else shown
 
 
-def _per(effect: Effect) -> str:
+def _per(effect: TrendSlope) -> str:
     return f"per {effect.column.unit}" if effect.column.unit else "per unit"
 
 

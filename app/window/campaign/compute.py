@@ -20,7 +20,7 @@ from dearig.drivers.processes.children import isolated_spawn
 from dearig.errors import Interrupted
 from dearig.progress import Progress, quiet
 from dearig.window.jobs.program_errors import ErrorInProcess
-from dearig.window.jobs.worker_process import Request, Response, serve
+from dearig.window.jobs.worker_process import Request, WorkerMessage, serve
 
 __all__ = ["ComputeProcess"]
 
@@ -60,7 +60,7 @@ class ComputeProcess:
                     self.close()
                     raise Interrupted("interrupted in a computation after a run, at 0 V")
                 if connection.poll(_POLL):
-                    answer: Response = connection.recv()
+                    answer: WorkerMessage = connection.recv()
                     if answer.kind != "progress":
                         break
                     progress(*answer.value)

@@ -22,7 +22,6 @@ from dearig.batch.queue import DONE, WAITING, Queue
 from dearig.errors import InputError
 from dearig.recording.result_folder import numbered_folder
 from dearig.report.pages.campaign import duration_text
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.campaign.controls import CampaignControls
 from dearig.window.campaign.plan import (
     OpenedCampaign,
@@ -77,7 +76,7 @@ class CampaignPage(Page):
         super().__init__(session, parent)
         self._session = session
         self._runner = runner
-        self.faults: FaultPlan | None = None  #: faults of the next simulated campaign
+        self.faults: tuple[str, ...] = ()  #: faults of the next simulated campaign
         self._worker = Worker(self)
         self._folder: Path | None = None  # of the campaign that was begun
         self._queue = Queue()  # its state, as its journal says
@@ -449,7 +448,7 @@ class CampaignPage(Page):
         folder = dialogs.choose_folder(
             self, self._session, "Continue a campaign", self._session.folder
         )
-        if folder is not None and (self._folder is not None or self.plan.confirm_discard()):
+        if folder is not None and (self._folder is not None or self.plan.files.confirm_discard()):
             self.open_campaign(folder)
 
     @Slot()

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.window.campaign.controls import CampaignControls
-from dearig.window.high_voltage.status import HighVoltageStatus, Reading
+from dearig.window.high_voltage.status import HighVoltageStatus, OutputReading
 from dearig.window.run.live import Live
 from dearig.window.run.plots import PLOTS, RunPlots
 from dearig.window.session.state import Session
@@ -85,5 +85,5 @@ class PresentRun(QWidget):
         if now is not None:
             monitor = now.values.get("monitor", float("nan"))
             self._status.show_reading(
-                Reading(monitor, now.samples / now.rate, now.total / now.rate)
+                OutputReading(monitor, now.samples / now.rate, now.total / now.rate)
             )

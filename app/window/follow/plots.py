@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.analysis.tracking import TrackedRun, Tracking
 from dearig.window.plots.area import PlotArea
-from dearig.window.plots.plot import Entry
+from dearig.window.plots.plot import LegendEntry
 from dearig.window.session.state import Session
 
 __all__ = ["ErrorPlot", "FollowPlots"]
@@ -87,7 +87,7 @@ class FollowPlots(QWidget):
         if self._runs:
             noise = self._runs[-1].noise * 1e6
             error.add_levels(theme, "Noise of a reading", -noise, noise)
-            error.add_entry(Entry("noise of a reading", theme.muted, dashed=True))
+            error.add_entry(LegendEntry("noise of a reading", theme.muted, dashed=True))
         self._shade()
 
     def _shade(self) -> None:
@@ -105,7 +105,7 @@ class FollowPlots(QWidget):
                 region.setToolTip(part.why)
                 region.setZValue(-10)
                 plot.addItem(region, ignoreBounds=True)
-        self.plots[1].add_entry(Entry("cannot be followed", theme.bad, area=True))
+        self.plots[1].add_entry(LegendEntry("cannot be followed", theme.bad, area=True))
 
 
 class ErrorPlot(QWidget):

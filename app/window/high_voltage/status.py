@@ -18,13 +18,20 @@ from PySide6.QtCore import QLockFile, QObject, Qt, QTimer, Signal, Slot
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.output_state import Known, OutputState
-from dearig.window.high_voltage.responsiveness import REACTION, Responsiveness
 from dearig.window.high_voltage.state import HighVoltage, kilovolts, state_at_rest
 from dearig.window.session.recovery import lock_of, unsaved_folder
 from dearig.window.session.settings import kept_text
 from dearig.window.session.state import Session
 
-__all__ = ["ARMED_FOR", "HighVoltageStatus", "LatchedAlarm", "Reading", "recording_of"]
+__all__ = [
+    "ARMED_FOR",
+    "REACTION",
+    "HighVoltageStatus",
+    "LatchedAlarm",
+    "OutputReading",
+    "Responsiveness",
+    "recording_of",
+]
 
 log = logging.getLogger(__name__)
 
@@ -65,7 +72,7 @@ class LatchedAlarm:
 
 
 @dataclass(frozen=True)
-class Reading:
+class OutputReading:
     """Voltage monitor in V, and the time ``seconds`` of ``total`` s in the sequence."""
 
     monitor: float
@@ -111,7 +118,7 @@ class HighVoltageStatus(QObject):
         self._opening.timeout.connect(self._open_start)
         self._ticks = QTimer(self, interval=_TICK)
         self._ticks.timeout.connect(self._tick)
-        self.reading: Reading | None = None
+        self.reading: OutputReading | None = None
         self.run_number = 0
         self._lock: QLockFile | None = None  # while a run goes on
         self.alarm: LatchedAlarm | None = None
@@ -269,7 +276,7 @@ class HighVoltageStatus(QObject):
             return reading.monitor, f"last sample,\n{reading.seconds:.2f} s"
         return math.nan, ""
 
-    def show_reading(self, reading: Reading) -> None:
+    def show_reading(self, reading: OutputReading) -> None:
         """Show the newest samples of a run."""
         if reading != self.reading:
             self.reading = reading
@@ -416,3 +423,40 @@ def recording_of(alarm: LatchedAlarm) -> Path | None:
     """Return the recording of the run that ``alarm`` ended, where there is one."""
     path = Path(alarm.recording)
     return path if alarm.recording and path.is_file() else None
+
+
+#: s that a person needs to answer something seen: the mean of 1469 adults was 0.231 s (Woods et
+#: al., "Factors influencing the latency of simple reaction time", Front. Hum. Neurosci. 9:131,
+#: 2015). A shorter pause hides nothing that could have been answered.
+REACTION = 0.25
+_BEAT = 100  # ms
+
+
+class Responsiveness(QObject):
+    """Watches the event loop of the interface thread.
+
+    A key or click that is handled while ``now`` is True was made at most 2 ``REACTION`` before:
+    neither the pause before the last beat nor that after it was longer than ``REACTION``. The time
+    stamps of the events say less: on Windows they are those of their reading.
+    """
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._last = time.monotonic()  # of the beats
+        self._doubtful = 0.0  # until then what waited during a pause may still come
+        self._beats = QTimer(self, interval=_BEAT)
+        self._beats.timeout.connect(self._beat)
+        self._beats.start()
+
+    @property
+    def now(self) -> bool:
+        """True where the window has answered in time up to this moment."""
+        now = time.monotonic()
+        return now - self._last <= REACTION and now >= self._doubtful
+
+    @Slot()
+    def _beat(self) -> None:
+        now = time.monotonic()
+        if now - self._last > REACTION:
+            self._doubtful = now + REACTION
+        self._last = now

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from dearig.recording.importers.listing import ColumnPreview, Guessed, Proposal
+from dearig.recording.importers.listing import ColumnGuesses, ColumnPreview, Guessed
 from dearig.recording.importers.quantities.labels import DIMENSIONS, RAW, target_name
 from dearig.recording.importers.quantities.units import UNITS
 
@@ -76,7 +76,7 @@ def units_of(quantity: str, raw: bool) -> list[str]:
     return [*units, AT_CARD] if raw and quantity in RAW.values() else units
 
 
-def first_choices(proposal: Proposal) -> dict[int, ColumnChoice]:
+def first_choices(proposal: ColumnGuesses) -> dict[int, ColumnChoice]:
     """Return the choices that are sure; what is a guess is left open."""
     found = {}
     for number, guess in proposal.guesses.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -15,7 +14,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
-    QProgressBar,
     QScrollArea,
     QSplitter,
     QVBoxLayout,
@@ -28,7 +26,7 @@ from dearig.errors import InputError
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.files import check_output
 from dearig.recording.importers import Imported, ImportOptions
-from dearig.recording.importers.listing import Content, Proposal
+from dearig.recording.importers.listing import ColumnGuesses, Content
 from dearig.window.imports.choice import (
     ColumnChoice,
     columns_option,
@@ -41,6 +39,7 @@ from dearig.window.imports.memory import ImportMemory, Remembered
 from dearig.window.imports.options import ImportFields
 from dearig.window.imports.plot import ImportPlot
 from dearig.window.imports.table import ImportTable
+from dearig.window.jobs.job_controls import JobControls
 from dearig.window.jobs.worker import Job, Worker
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import ElidedLabel, Message, button, label, name_list
@@ -73,7 +72,6 @@ class ImportDialog(QDialog):
         super().__init__(parent)
         self._session, self._worker, self.path = session, worker, path
         self._memory = ImportMemory(session.settings)
-        self._job: Job | None = None
         self._writing = False
         self.content: Content | None = None
         self._signature = ""  # of the table, with its names as they are found by themselves
@@ -143,31 +141,20 @@ class ImportDialog(QDialog):
         available = QGuiApplication.primaryScreen().availableSize()
         self.resize(min(_SIZE[0], available.width() - 60), min(_SIZE[1], available.height() - 60))
 
-    def _bottom(self) -> QVBoxLayout:
+    def _bottom(self) -> QHBoxLayout:
         self.out = QLineEdit(_free_name(self._session.folder, self.path.stem))
         self.out.setToolTip("Name of the recording in the folder of recordings")
         caption = QLabel("Recording &name")
         caption.setBuddy(self.out)
-        self.bar = QProgressBar()
-        self.bar.setRange(0, 1000)
-        self.bar.setTextVisible(False)
-        self.bar.setFixedHeight(10)
-        self.stage = label(" ", "muted")
         self.start = button("&Import", "Write the recording", primary=True)
         self.start.setDefault(True)
-        self.cancel = button("Cancel", "Import nothing; during an import, end it (Esc)")
+        self.job = JobControls(
+            self.start, "Cancel", "Import nothing; during an import, end it (Esc)", self.reject
+        )
         row = QHBoxLayout()
-        row.addWidget(caption)
-        row.addWidget(self.out, 1)
-        row.addWidget(self.start)
-        row.addWidget(self.cancel)
-        doing = QHBoxLayout()
-        doing.addWidget(self.bar, 1)
-        doing.addWidget(self.stage, 1)
-        bottom = QVBoxLayout()
-        bottom.addLayout(doing)
-        bottom.addLayout(row)
-        return bottom
+        for part, share in ((caption, 0), (self.out, 1), (self.job, 1)):
+            row.addWidget(part, share, Qt.AlignmentFlag.AlignTop)
+        return row
 
     def _connect(self) -> None:
         self.columns.changed.connect(self._changed)
@@ -178,7 +165,6 @@ class ImportDialog(QDialog):
         self.forget.clicked.connect(self._forget)
         self.out.textEdited.connect(self._show_state)
         self.start.clicked.connect(self.begin)
-        self.cancel.clicked.connect(self.reject)
 
     # the file
 
@@ -216,11 +202,11 @@ class ImportDialog(QDialog):
                 return
         self._begin_choices()
 
-    def _proposal(self) -> Proposal:
+    def _proposal(self) -> ColumnGuesses:
         """Return the proposal for the table that is chosen; an empty one without."""
         name = self.table_box.currentData()
         known = {} if self.content is None else self.content.proposals
-        return known.get("" if name is None else name, Proposal({}, (), ""))
+        return known.get("" if name is None else name, ColumnGuesses({}, (), ""))
 
     def _begin_choices(self) -> None:
         """Fill the boxes: as remembered, or else with what is sure."""
@@ -383,35 +369,23 @@ class ImportDialog(QDialog):
         """Run ``function`` in the other process in place of what runs there."""
         self._drop()
         job = self._worker.submit(function, *given, whole=True)
-        self._job = job
-        job.progressed.connect(self._progressed)
         job.finished.connect(lambda found: self._after(job, lambda: then(found)))
         job.failed.connect(lambda sentence: self._after(job, lambda: self._failed(sentence)))
         job.cancelled.connect(lambda: self._after(job, self._stopped))
-        self.bar.setValue(0)
-        self.stage.setText("Starting")
+        self.job.begin(job)
 
     def _drop(self) -> None:
         """End the present job; nothing of it is shown."""
-        job, self._job = self._job, None
+        job = self.job.job
+        self.job.end()
         if job is not None:
             job.cancel()
 
     def _after(self, job: Job, then: Callable[[], object]) -> None:
         """Do ``then`` if ``job`` is the present one, which has ended."""
-        if job is self._job:
-            self._job = None
-            self.bar.setValue(0)
-            self.stage.setText(" ")
+        if job is self.job.job:
+            self.job.end()
             then()
-
-    @Slot(str, float, float)
-    def _progressed(self, stage: str, fraction: float, left: float) -> None:
-        if self._job is None or self._job.asked_to_stop:
-            return
-        self.bar.setValue(round(1000 * fraction))
-        about = "" if math.isnan(left) else f", about {max(round(left), 1)} s left"
-        self.stage.setText(f"{stage.capitalize()}{about}")
 
     def _failed(self, sentence: str) -> None:
         self._writing = False
@@ -477,9 +451,8 @@ class ImportDialog(QDialog):
 
     def reject(self) -> None:
         """End an import that goes on; otherwise close the dialog."""
-        if self._writing and self._job is not None:
-            self.stage.setText("Ending; click Cancel again to end at once")
-            self._job.cancel()
+        if self._writing and self.job.job is not None:
+            self.job.cancel()
             return
         self._later.stop()
         self._drop()

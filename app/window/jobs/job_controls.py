@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import Qt, Slot
 from PySide6.QtWidgets import (
@@ -20,6 +21,8 @@ from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import button, label
 
 __all__ = ["JobControls", "result_side", "splitter"]
+
+_PARTS = 1000  # of the bar of progress
 
 
 def splitter(orientation: Qt.Orientation, *parts: QWidget, growing: int | None = None) -> QSplitter:
@@ -59,20 +62,30 @@ def result_side(
 
 
 class JobControls(QWidget):
-    """Button ``start`` of a job, one that cancels it, and its progress.
+    """Button ``start`` of a job, one that cancels it, its progress and the time that is left.
 
-    ``cancel`` is the text of the latter, with its key.
+    ``cancel`` is the text of the latter, with its key, and ``tip`` its tooltip. With ``cancelled``
+    that button can always be pressed, and calls it in place of ``cancel``.
     """
 
-    def __init__(self, start: QPushButton, cancel: str, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        start: QPushButton,
+        cancel: str,
+        tip: str = "End the computation; a second click ends at once",
+        cancelled: Callable[[], object] | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._job: Job | None = None
-        self.cancel_button = button(cancel, "End the computation; a second click ends at once")
-        self.cancel_button.clicked.connect(self._cancel)
+        self.job: Job | None = None
+        self._always = cancelled is not None
+        self.cancel_button = button(cancel, tip)
+        self.cancel_button.clicked.connect(cancelled or self.cancel)
         self.bar = QProgressBar()
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(8)
         self.stage = label("", "muted")
+        self.stage.setWordWrap(True)
         buttons = QHBoxLayout()
         buttons.addWidget(start, 2)
         buttons.addWidget(self.cancel_button, 1)
@@ -85,7 +98,7 @@ class JobControls(QWidget):
 
     def begin(self, job: Job) -> None:
         """Show the progress of ``job``."""
-        self._job = job
+        self.job = job
         job.progressed.connect(self._progressed)
         self.stage.setText("Starting")
         self.bar.setRange(0, 0)
@@ -93,18 +106,31 @@ class JobControls(QWidget):
 
     def end(self) -> None:
         """Show that no job goes on."""
-        self._job = None
+        self.job = None
         self.stage.setText(" ")  # keeps its height
         self.bar.setRange(0, 1)
-        self.cancel_button.setEnabled(False)
-
-    @Slot(str, float, float)
-    def _progressed(self, stage: str, fraction: float, left: float) -> None:  # noqa: ARG002
-        if self._job is not None and not self._job.asked_to_stop:
-            self.stage.setText(f"{stage[:1].upper()}{stage[1:]}")
+        self.bar.reset()
+        self.cancel_button.setEnabled(self._always)
 
     @Slot()
-    def _cancel(self) -> None:
-        if self._job is not None:
+    def cancel(self) -> None:
+        """End the job; the second call ends it at once."""
+        if self.job is not None:
             self.stage.setText("Ending; click Cancel again to end at once")
-            self._job.cancel()
+            self.job.cancel()
+
+    @Slot(str, float, float)
+    def _progressed(self, stage: str, fraction: float, left: float) -> None:
+        if self.job is None or self.job.asked_to_stop:
+            return
+        if fraction > 0.0:  # a stage that reports no fraction keeps the bar that only moves
+            self.bar.setRange(0, _PARTS)
+            self.bar.setValue(round(_PARTS * fraction))
+        of = "" if self.job.whole else " of this step"
+        about = "" if math.isnan(left) else f", about {_roughly(left)}{of} left"
+        self.stage.setText(f"{stage[:1].upper()}{stage[1:]}{about}")
+
+
+def _roughly(left: float) -> str:
+    """Return a rough duration; ``left`` in s."""
+    return f"{max(round(left), 1)} s" if left < 100.0 else f"{round(left / 60.0)} min"

@@ -19,18 +19,18 @@ from dearig.window.jobs.program_errors import ErrorInProcess
 from dearig.window.jobs.worker_process import (
     CURRENT,
     Request,
-    Response,
     StopRequest,
+    WorkerMessage,
     broken,
     serve,
 )
 
-__all__ = ["Estimate", "Job", "Worker"]
+__all__ = ["Job", "TimeLeft", "Worker"]
 
 log = logging.getLogger(__name__)
 
 
-class Estimate:
+class TimeLeft:
     """Time that a stage still needs, estimated from the time it has taken."""
 
     #: No estimate is made before this part of the stage is done and this many s have passed.
@@ -95,7 +95,7 @@ class Worker(QObject):
         self._current: Job | None = None
         self._urgent: deque[Job] = deque()
         self._waiting: deque[Job] = deque()
-        self._estimate = Estimate()
+        self._estimate = TimeLeft()
         self._arrived.connect(self._take, Qt.ConnectionType.QueuedConnection)
 
     def submit(
@@ -153,7 +153,7 @@ class Worker(QObject):
         if self._current is not None or not queue:
             return
         self._current = queue.popleft()
-        self._estimate = Estimate()
+        self._estimate = TimeLeft()
         if self._process is None:
             self._start()
         self._send(self._current.request)
@@ -209,7 +209,7 @@ class Worker(QObject):
     # messages of the process
 
     @Slot(int, object)
-    def _take(self, life: int, answer: Response | None) -> None:
+    def _take(self, life: int, answer: WorkerMessage | None) -> None:
         if life != self._life:
             return
         job = self._current

@@ -15,7 +15,7 @@ from typing import Any
 
 from dearig.errors import DearigError
 
-__all__ = ["CURRENT", "Request", "Response", "StopRequest", "broken", "serve"]
+__all__ = ["CURRENT", "Request", "StopRequest", "WorkerMessage", "broken", "serve"]
 
 #: Number in a response to a request that could not be read.
 CURRENT = -1
@@ -41,7 +41,7 @@ class StopRequest:
 
 
 @dataclass(frozen=True)
-class Response:
+class WorkerMessage:
     """Message about the job ``number``.
 
     ``kind`` is progress (``value`` is a stage and its fraction), done (``value`` is the result),
@@ -114,7 +114,7 @@ def _unraisable(found: Any, lost: threading.Event) -> None:
         sys.__unraisablehook__(found)
 
 
-def _done(connection: Connection, request: Request, lost: threading.Event) -> Response:
+def _done(connection: Connection, request: Request, lost: threading.Event) -> WorkerMessage:
     last = ("", -1.0)
     lost.clear()
 
@@ -125,7 +125,7 @@ def _done(connection: Connection, request: Request, lost: threading.Event) -> Re
             raise KeyboardInterrupt
         if stage != last[0] or fraction - last[1] >= _STEP:
             last = (stage, fraction)
-            connection.send(Response(request.number, "progress", last))
+            connection.send(WorkerMessage(request.number, "progress", last))
 
     try:
         try:
@@ -135,16 +135,16 @@ def _done(connection: Connection, request: Request, lost: threading.Event) -> Re
             # a late interrupt must not cut the next message
             signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
-        return Response(request.number, "stopped", None)
+        return WorkerMessage(request.number, "stopped", None)
     except DearigError as error:
-        return Response(request.number, "refused", str(error))
+        return WorkerMessage(request.number, "refused", str(error))
     except Exception as error:  # noqa: BLE001  (an error must reach the person who waits)
         return broken(request.number, error)
-    return Response(request.number, "done", value)
+    return WorkerMessage(request.number, "done", value)
 
 
-def broken(number: int, error: Exception) -> Response:
+def broken(number: int, error: Exception) -> WorkerMessage:
     """Return the response for an error in the program; the window logs its traceback."""
     words = f"an error in the program ended this work ({type(error).__name__}: {error})"
     trace = "".join(traceback.format_exception(error))
-    return Response(number, "broken", (words, trace))
+    return WorkerMessage(number, "broken", (words, trace))

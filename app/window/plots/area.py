@@ -20,7 +20,7 @@ from dearig.recording.files import in_words
 from dearig.window.documents.dialogs import save_as
 from dearig.window.plots import export as plot_export
 from dearig.window.plots.canvas import Canvas, Drag
-from dearig.window.plots.cursors import Group
+from dearig.window.plots.cursors import CursorGroup
 from dearig.window.plots.plot import Plot
 from dearig.window.plots.tools import PlotTools
 from dearig.window.session.state import Session
@@ -74,9 +74,9 @@ class PlotArea(QWidget):
         self.canvas.setAccessibleName(name)
         self._rows: dict[int, tuple[int, int]] = {}  # weight and least height in px
         self._rows_of: dict[Plot, range] = {}
-        self._groups: dict[str, Group] = {}
-        self._group_of: dict[Plot, Group] = {}
-        self._active: Group | None = None  # the pointer was on it last
+        self._groups: dict[str, CursorGroup] = {}
+        self._group_of: dict[Plot, CursorGroup] = {}
+        self._active: CursorGroup | None = None  # the pointer was on it last
         self._history: list[_Past] = []
         self._following = live
         self._range_chosen = False  # the operator has chosen a range
@@ -163,7 +163,7 @@ class PlotArea(QWidget):
             self._rows[taken] = (weight, least)
         self._rows_of[plot] = range(row, row + rows)
         self.canvas.area_plots.append(plot)
-        chosen = self._groups.setdefault(group, Group(group))
+        chosen = self._groups.setdefault(group, CursorGroup(group))
         chosen.add(plot)
         if len(chosen.plots) > 1:
             plot.vb.setXRange(*chosen.plots[0].vb.viewRange()[0], padding=0.0)
@@ -303,7 +303,7 @@ class PlotArea(QWidget):
         """Text of the place of the crosshair or the cursors."""
         return self.tools.readout.full_text
 
-    def group(self, name: str = "time") -> Group:
+    def group(self, name: str = "time") -> CursorGroup:
         """Return the plots that share the horizontal axis ``name``."""
         return self._groups[name]
 
@@ -314,7 +314,7 @@ class PlotArea(QWidget):
         active = self._active_group()
         self.tools.readout.show_text("" if active is None else active.readout())
 
-    def _active_group(self) -> Group | None:
+    def _active_group(self) -> CursorGroup | None:
         if self._active is not None and self._active.shown:
             return self._active
         return next((g for g in self._groups.values() if g.shown), None)

@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor
 from dearig.window.kit.theme import Theme
 from dearig.window.plots.plot import Plot
 
-__all__ = ["Group"]
+__all__ = ["CursorGroup"]
 
 _FIRST_PLACES = (1.0 / 3.0, 2.0 / 3.0)  # of the visible range, where the cursors appear
 _DELTA = "B\N{MINUS SIGN}A"
@@ -25,7 +25,7 @@ class _CursorLabel(pg.InfLineLabel):
             super().viewTransformChanged()
 
 
-class Group:
+class CursorGroup:
     """Plots with one horizontal axis: their crosshair, their cursors A and B, and the readouts."""
 
     def __init__(self, name: str) -> None:

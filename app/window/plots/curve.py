@@ -13,7 +13,7 @@ from PySide6.QtGui import QColor
 from dearig.analysis.decimate import decimate_on_grid
 from dearig.window.kit.theme import pen
 
-__all__ = ["Curve", "PointSource", "cut_lines"]
+__all__ = ["PlotCurve", "PointSource", "cut_lines"]
 
 #: Returns all points (x, y) of a curve, where the curve itself holds only what is visible.
 PointSource = Callable[[], tuple[np.ndarray, np.ndarray]]
@@ -22,7 +22,7 @@ _POINTS_PER_PIXEL = 2  # the lowest and the highest sample of a column of pixels
 _MARGIN = 1  # points beyond each edge of the view, so that the line reaches the edge
 
 
-class Curve(pg.PlotCurveItem):
+class PlotCurve(pg.PlotCurveItem):
     """Line through points, with symbols if ``symbol`` is given; it breaks where y is NaN.
 
     ``x`` and ``y`` are in the units of the axes. Where there are more points than the plot has

@@ -14,9 +14,9 @@ from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPainter
 from PySide6.QtWidgets import QGraphicsSceneResizeEvent, QStyleOptionGraphicsItem, QWidget
 
 from dearig.window.kit.theme import Theme, pen, style_plot
-from dearig.window.plots.curve import Curve
+from dearig.window.plots.curve import PlotCurve
 
-__all__ = ["AxisText", "Entry", "Plot"]
+__all__ = ["AxisText", "LegendEntry", "Plot"]
 
 _SAMPLE = 18.0  # px, length of a line in the key
 _GAP = 5.0  # px between the line and its name
@@ -59,7 +59,7 @@ class AxisText:
 
 
 @dataclass(frozen=True)
-class Entry:
+class LegendEntry:
     """One entry of a key: a line, a symbol or a coloured area, and its name."""
 
     name: str
@@ -103,11 +103,11 @@ class Plot(pg.PlotItem):
         self.dates = dates  #: the horizontal axis is Unix time in s, shown as local time
         self.axis_texts: dict[str, AxisText] = {}
         self._labels: dict[str, tuple[str, float]] = {}  # that are shown, with their points
-        self.drawn: list[Curve] = []
+        self.drawn: list[PlotCurve] = []
         self.auto_y = True
         self._own_range = own_range
         self.same_y: tuple[Plot, ...] = (self,)  #: plots with this vertical axis
-        self._entries: list[Entry] = []
+        self._entries: list[LegendEntry] = []
         self._note = ""
         view.setMouseEnabled(x=False, y=False)  # the area handles the mouse
         view.disableAutoRange()
@@ -203,9 +203,9 @@ class Plot(pg.PlotItem):
         line: bool = True,
         size: int = 5,
         in_key: bool = True,
-    ) -> Curve:
+    ) -> PlotCurve:
         """Add an empty curve; one without a ``name`` is neither in the key nor in the data."""
-        curve = Curve(name, symbol, line, size, in_key)
+        curve = PlotCurve(name, symbol, line, size, in_key)
         curve.set_colour(colour, dashed)
         curve.set_log(*self.log)
         self.addItem(curve)
@@ -215,7 +215,7 @@ class Plot(pg.PlotItem):
         self.renew_key()
         return curve
 
-    def add_entry(self, entry: Entry) -> None:
+    def add_entry(self, entry: LegendEntry) -> None:
         """Add an entry to the key for something that is not a curve."""
         self._entries.append(entry)
         self.renew_key()
@@ -242,16 +242,16 @@ class Plot(pg.PlotItem):
             self.removeItem(item)
         self.renew_key()
 
-    def curves_in_key(self) -> list[Curve]:
+    def curves_in_key(self) -> list[PlotCurve]:
         """Return the curves that are in the key."""
         return [curve for curve in self.drawn if curve.title and curve.in_key]
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[LegendEntry]:
         """Return the entries of the key."""
         curves = [
-            Entry(c.title, c.colour, c.dashed, c.symbol, c.line) for c in self.curves_in_key()
+            LegendEntry(c.title, c.colour, c.dashed, c.symbol, c.line) for c in self.curves_in_key()
         ]
-        note = [Entry(self._note, "#808080", line=False)] if self._note else []
+        note = [LegendEntry(self._note, "#808080", line=False)] if self._note else []
         return curves + self._entries + note
 
     def renew_key(self, values: tuple[str, ...] = ()) -> None:
@@ -322,9 +322,9 @@ class _Key(pg.GraphicsWidget):
     def __init__(self, plot: Plot) -> None:
         super().__init__()
         self._plot = plot
-        self._entries: list[Entry] = []
+        self._entries: list[LegendEntry] = []
         self._values: tuple[str, ...] = ()
-        self._places: list[tuple[Entry, str, QPointF]] = []
+        self._places: list[tuple[LegendEntry, str, QPointF]] = []
         self._colour = "#808080"
         font = QGuiApplication.font()
         font.setPointSizeF(_KEY_POINTS)
@@ -336,7 +336,7 @@ class _Key(pg.GraphicsWidget):
         self._colour = colour
         self.update()
 
-    def show_entries(self, entries: list[Entry], values: tuple[str, ...]) -> None:
+    def show_entries(self, entries: list[LegendEntry], values: tuple[str, ...]) -> None:
         if (entries, values) == (self._entries, self._values) and self._rows >= 0:
             return
         self._entries, self._values = entries, values

@@ -16,7 +16,7 @@ from dearig.window.kit.theme import pen
 from dearig.window.kit.widgets import plain_tip
 from dearig.window.plots.area import PlotArea
 from dearig.window.plots.limit_lines import MarkLine, PlotOverlay
-from dearig.window.plots.plot import Entry
+from dearig.window.plots.plot import LegendEntry
 from dearig.window.run.channel_plots import ChannelPlots
 from dearig.window.session.state import Session
 
@@ -138,7 +138,7 @@ class CurvesPlot(QWidget):
                 )
             self._events(self._shown[0])
         elif self._with_model and any(c.model is not None for c in self._shown):
-            both.add_entry(Entry("model of each recording", theme.muted, dashed=True))
+            both.add_entry(LegendEntry("model of each recording", theme.muted, dashed=True))
 
     def _events(self, curves: Curves) -> None:
         theme = self._session.theme

@@ -31,7 +31,7 @@ from dearig.units import SHOWN
 from dearig.window.kit.widgets import plain_tip
 from dearig.window.session.state import Session
 
-__all__ = ["COLUMNS", "PATH", "SUMMARY", "Column", "FolderModel", "ThumbnailDelegate"]
+__all__ = ["COLUMNS", "PATH", "SUMMARY", "FolderModel", "ListColumn", "ThumbnailDelegate"]
 
 _Index = QModelIndex | QPersistentModelIndex
 
@@ -43,7 +43,7 @@ _SETTLE_MS = 300
 
 
 @dataclass(frozen=True)
-class Column:
+class ListColumn:
     """A column: ``head`` (also its name in the settings), ``tip``, and default width in pixels.
 
     ``shown``: it is among the columns of the first start. ``number``: right-aligned, and sorted by
@@ -69,7 +69,7 @@ class Column:
 
 def _number(
     head: str, key: str, tip: str, digits: int = 3, *, shown: bool = True, width: int = 66
-) -> Column:
+) -> ListColumn:
     def value(summary: RecordingSummary) -> float | None:
         return numbers(summary).get(key)
 
@@ -77,17 +77,17 @@ def _number(
         found = value(summary)
         return "" if found is None else significant(found, digits)
 
-    return Column(head, tip, width, text, value, shown, number=True)
+    return ListColumn(head, tip, width, text, value, shown, number=True)
 
 
-def _text_column(key: str) -> Column:
+def _text_column(key: str) -> ListColumn:
     def text(summary: RecordingSummary) -> str:
         return " ".join(summary.texts.get(key, "").split())
 
     field = TEXTS[key]
     # 8 px a character, and 2 px beside them
     width = 8 * field.characters + 2
-    return Column(field.label, field.tip, width, text, shown=field.shown, wide=field.wide)
+    return ListColumn(field.label, field.tip, width, text, shown=field.shown, wide=field.wide)
 
 
 def _errors(summary: RecordingSummary) -> float | None:
@@ -120,29 +120,31 @@ def _seconds(summary: RecordingSummary) -> str:
 
 #: All columns, in their order.
 COLUMNS = (
-    Column(
+    ListColumn(
         "", "Measured displacement (or stress) over time", 72, lambda _: "", lambda s: s.name,
         title="Thumbnail",
     ),
-    Column("Recording", "Path of the file in the folder, without its ending", 150,
+    ListColumn("Recording", "Path of the file in the folder, without its ending", 150,
            lambda s: s.name, lambda s: s.name.casefold(), wide=True),
-    Column("Sequence", "Name of the sequence", 130, lambda s: s.title, wide=True),
+    ListColumn("Sequence", "Name of the sequence", 130, lambda s: s.title, wide=True),
     *(_text_column(key) for key, field in TEXTS.items() if field.shown),
-    Column("Start", "Start of the run: local time, with its offset from UTC", 178,
+    ListColumn("Start", "Start of the run: local time, with its offset from UTC", 178,
            lambda s: local_time(s.started), lambda s: s.started),
-    Column("Duration", "Duration in s", 66, _seconds, lambda s: s.duration, number=True),
+    ListColumn("Duration", "Duration in s", 66, _seconds, lambda s: s.duration, number=True),
     _number("Peak kV", "peak_kV", "Largest commanded voltage in kV"),
     _number("Peak mm", "peak_mm", "Largest displacement in mm", width=70),
     _number("Peak mA", "current_mA", "Largest current that was measured, in mA", shown=False),
-    Column("RMS error", "RMS error of the chosen model, in µm (kPa for a film driven by stretch); "
+    ListColumn("RMS error",
+           "RMS error of the chosen model, in µm (kPa for a film driven by stretch); "
            "* the model was fitted to this recording", 80, _rms, _errors, number=True),
     _number("NRMSE %", "nrmse_pct", "RMS error in % of the measured range", shown=False, width=72),
     _number("RMS / noise", "over_noise", "RMS error over the noise floor; 1 is the best possible",
             shown=False, width=92),
     _number("Noise µm", "noise_um", "Noise of the displacement at 0 V, in µm", shown=False,
             width=78),
-    Column("How it ended", "How the run ended, and its events", 128, _ended, _severity, wide=True),
-    Column("Tags", "Tags; select recordings and press Ctrl+T to change them", 84,
+    ListColumn("How it ended", "How the run ended, and its events", 128, _ended, _severity,
+           wide=True),
+    ListColumn("Tags", "Tags; select recordings and press Ctrl+T to change them", 84,
            lambda s: ", ".join(s.tags), wide=True),
     *(_text_column(key) for key, field in TEXTS.items() if not field.shown),
 )  # fmt: skip

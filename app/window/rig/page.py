@@ -29,13 +29,11 @@ from dearig.acquisition.rigs import is_simulated
 from dearig.config.rigfile import RigFile
 from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values
 from dearig.config.toml_edit import with_key
-from dearig.config.toml_input import read_text
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.errors import AddressError
 from dearig.errors import InputError
 from dearig.units import readable
-from dearig.window.documents.dialogs import choose_file, save_as
-from dearig.window.documents.questions import confirm_discard, replace_or_tell
+from dearig.window.documents.file_actions import FileActions
 from dearig.window.jobs.background import Background
 from dearig.window.kit.fields import form_fields, in_words
 from dearig.window.kit.form import Form
@@ -43,7 +41,7 @@ from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
 from dearig.window.session.page import Page
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import OverwriteQuestion, Saved, TextFile
+from dearig.window.session.text_file import TextFile
 
 __all__ = ["RigPage"]
 
@@ -73,9 +71,10 @@ class RigPage(Page):
         self._checks.done.connect(self._checked)
         self._checks.failed.connect(lambda words: self.summary.show_text(words))
         self._checks.busy_changed.connect(self._checking)
-        self._files = Background(self)
-        self._files.done.connect(self._file_done)
-        self._files.failed.connect(lambda words: self.trouble.show_text(words))
+        self.files = FileActions(self, session, "rig file", lambda: (self.text, self.file))
+        self.files.chosen.connect(self.files.open)
+        self.files.opened.connect(self._opened)
+        self.files.saved.connect(self._saved)
         self.outcome: CheckOutcome | None = None
         self.setAcceptDrops(True)
         self._build()
@@ -171,31 +170,9 @@ class RigPage(Page):
         if session.rig_text not in (self.text, self._in_force):  # another page opened another file
             self.text = self._in_force = session.rig_text
             self.file = TextFile("rig file", self.text, session.rig_path)
-            session.recovery.note(self.file, self.text)
             self._show_all()
 
     # the rig file
-
-    def open_file(self, path: Path) -> None:
-        """Read a rig file."""
-        if confirm_discard(self, self.session, self.file, self.text):
-            self._files.start(lambda: (path, read_text(path, "rig file")))
-
-    @Slot()
-    def save(self) -> None:
-        """Write the rig file to its file, or ask for one."""
-        if self.file.path is None:
-            self._ask_save()
-        else:
-            self.save_file(self.file.path)
-
-    def save_file(self, path: Path, replace: bool = False) -> None:
-        """Write the rig file to ``path``; an existing file is replaced as a whole.
-
-        Asks where another program has changed the file since it was opened, unless ``replace``.
-        """
-        file, text = self.file, self.text
-        self._files.start(lambda: file.write(path, text, replace))
 
     def set_value(self, table: str, key: str, value: Any) -> None:
         """Change one key; a rig file with faults shows them, is not used, and blocks arming."""
@@ -209,35 +186,28 @@ class RigPage(Page):
     def close_work(self) -> None:
         """Wait for the threads."""
         self._checks.close()
-        self._files.close()
+        self.files.close()
 
-    @Slot(object)
-    def _file_done(self, answer: tuple[Path, str] | Saved | OverwriteQuestion) -> None:
-        self.trouble.show_text("")
-        if isinstance(answer, OverwriteQuestion):
-            replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
-        elif isinstance(answer, Saved):
-            answer.file.note(answer)
-            self._take(self.text, self.file)  # the path may be another one
-            self._show_all()
-            self.session.message.emit(f"Saved {answer.path}")
-        else:
-            path, text = answer
-            self._take(text, TextFile("rig file", text, path))
-            self._show_all()
+    @Slot(str, TextFile)
+    def _opened(self, text: str, file: TextFile) -> None:
+        self._take(text, file)
+        self._show_all()
+
+    @Slot()
+    def _saved(self) -> None:
+        self._take(self.text, self.file)  # the path may be another one
 
     def _take(self, text: str, file: TextFile) -> None:
         try:
             faults = faults_of(text)
         except InputError as error:
-            self.trouble.show_text(f"{error}. The previous rig file stays in use.")
+            self.files.trouble.show_text(f"{error}. The previous rig file stays in use.")
             return
         self.text, self.file = text, file
         if not faults:
             self._in_force = text
             folder = None if file.path is None else file.path.resolve().parent
             self.session.set_rig_file(file.path, text, parse_rig_file(text, folder))
-        self.session.recovery.note(file, text)
         self._show_faults(faults)
 
     def _show_all(self) -> None:
@@ -261,8 +231,7 @@ class RigPage(Page):
         if faults:
             head = f"Fix {errors}; until then nothing can be armed. {self._limits_in_force()}"
         self.state.show_text("\n".join([head, *rest]).strip(), "bad")
-        self.file_name.setText(self.file.name(self.text))
-        self.file_name.setToolTip(self.file.tip)
+        self.files.note()
         self.save_button.setEnabled(not faults)
         self.save_as_button.setEnabled(not faults)
         self._block_arming(faults)
@@ -294,7 +263,7 @@ class RigPage(Page):
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802
         names = [url.toLocalFile() for url in event.mimeData().urls()]
         if names and not self.session.running:
-            self.open_file(Path(names[0]))
+            self.files.open(Path(names[0]))
         event.acceptProposedAction()
 
     # display
@@ -440,26 +409,24 @@ class RigPage(Page):
         column = QVBoxLayout()
         row = QHBoxLayout()
         row.addWidget(label("Rig file", "heading"))
-        self.file_name = label("", "muted")
-        row.addWidget(self.file_name, 1)
+        row.addWidget(self.files.name, 1)
         open_button = button("&Open …", "Read a rig file; files can be dropped here (Ctrl+Shift+O)")
         open_button.setShortcut(QKeySequence("Ctrl+Shift+O"))
-        open_button.clicked.connect(self._ask_open)
+        open_button.clicked.connect(self.files.ask_open)
         self.save_button = button("&Save", "Write the rig file to its file (Ctrl+S)")
         self.save_button.setShortcut(QKeySequence("Ctrl+S"))
-        self.save_button.clicked.connect(self.save)
+        self.save_button.clicked.connect(self.files.save)
         self.save_as_button = button(
             "Save &as …", "Write the rig file to another file (Ctrl+Shift+S)"
         )
         self.save_as_button.setShortcut(QKeySequence("Ctrl+Shift+S"))
-        self.save_as_button.clicked.connect(self._ask_save)
+        self.save_as_button.clicked.connect(self.files.ask_save)
         defaults = button("&Thesis rig", "Use the rig file of the thesis")
         defaults.clicked.connect(self._ask_defaults)
         for made in (open_button, self.save_button, self.save_as_button, defaults):
             row.addWidget(made)
         column.addLayout(row)
-        self.trouble = Message()
-        column.addWidget(self.trouble)
+        column.addWidget(self.files.trouble)
         self.state = Message()
         column.addWidget(self.state)
         self.tabs = QTabWidget()
@@ -496,23 +463,7 @@ class RigPage(Page):
         self._show_faults(faults_of(self.text))
 
     @Slot()
-    def _ask_open(self) -> None:
-        folder = "" if self.file.path is None else self.file.path.parent
-        path = choose_file(self, self.session, "Rig file", folder, "Rig files (*.toml)")
-        if path is not None:
-            self.open_file(path)
-
-    @Slot()
-    def _ask_save(self) -> None:
-        start = self.file.path or Path()
-        path = save_as(
-            self, self.session, "Save the rig file", start, "Rig files (*.toml)", ".toml"
-        )
-        if path is not None:
-            self.save_file(path)
-
-    @Slot()
     def _ask_defaults(self) -> None:
-        if confirm_discard(self, self.session, self.file, self.text):
+        if self.files.confirm_discard():
             self._take("", TextFile("rig file", ""))
             self._show_all()

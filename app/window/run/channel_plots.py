@@ -8,7 +8,7 @@ import numpy as np
 from PySide6.QtCore import QObject, Slot
 
 from dearig.window.plots.area import PlotArea
-from dearig.window.plots.curve import Curve
+from dearig.window.plots.curve import PlotCurve
 from dearig.window.plots.limit_lines import PlotOverlay, TripLevel
 from dearig.window.plots.plot import Plot
 from dearig.window.run.live import Live
@@ -30,7 +30,7 @@ class ChannelPlots(QObject):
         self._row = row
         self._shown: tuple[tuple[str, str], ...] = ()
         self.plots: list[Plot] = []
-        self.curves: list[Curve] = []
+        self.curves: list[PlotCurve] = []
         self.overlays: list[PlotOverlay] = []
         self._levels: list[tuple[TripLevel, ...]] = []
         session.theme_changed.connect(self._restyle)

@@ -18,9 +18,8 @@ from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rigs import is_simulated
 from dearig.analysis.hold import HoldPlan
 from dearig.drivers.daqmx.watchdog import watchdog_text
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
-from dearig.window.high_voltage.status import Reading
+from dearig.window.high_voltage.status import OutputReading
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, label
 from dearig.window.run.controls import RunControls
@@ -48,7 +47,7 @@ class RunPage(Page):
         super().__init__(session, parent)
         self.session = session
         self.runner = Runner(session, self)
-        self.faults: FaultPlan | None = None  #: faults of the next simulated run
+        self.faults: tuple[str, ...] = ()  #: faults of the next simulated run
         self.live: Live | None = None
         self._played_hold: HoldPlan | None = None  # of the run that is shown
         self._runs = 0
@@ -268,7 +267,7 @@ class RunPage(Page):
         if self.runner.running:
             seconds, total = now.samples / now.rate, now.total / now.rate
             monitor = now.values.get("monitor", float("nan"))
-            self.runner.status.show_reading(Reading(monitor, seconds, total))
+            self.runner.status.show_reading(OutputReading(monitor, seconds, total))
             playing = next((s[0] for s in self._segments if s[1] <= seconds < s[2]), "")
             self.controls.show_progress(now, playing)
 

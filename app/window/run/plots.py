@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.drivers.settings import RigSettings
 from dearig.window.plots.area import PlotArea
-from dearig.window.plots.curve import Curve
+from dearig.window.plots.curve import PlotCurve
 from dearig.window.plots.limit_lines import MarkLine, PlotOverlay, trip_levels
 from dearig.window.plots.plot import Plot
 from dearig.window.run.live import Live
@@ -88,7 +88,7 @@ class RunPlots(QWidget):
         self.rows = len(_SIGNALS) + 1  #: rows of the area that are taken
         self._planned = {n: self._plots[n].add_curve() for n in ("voltage", "displacement")}
         self._band = [self._plots["voltage"].add_curve() for _ in range(2)]
-        self._curves: dict[str, Curve] = {
+        self._curves: dict[str, PlotCurve] = {
             signal: self._plot_of(name, signal).add_curve()
             for name, (_, signals) in _SIGNALS.items()
             for signal in signals
@@ -405,7 +405,7 @@ class RunPlots(QWidget):
         return max(0.0, end - self.span_s), max(self.span_s, end)
 
 
-def _drawn(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+def _drawn(curve: PlotCurve) -> tuple[np.ndarray, np.ndarray]:
     x, y = curve.getData()
     return (np.empty(0), np.empty(0)) if x is None else (x, y)
 

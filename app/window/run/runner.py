@@ -32,7 +32,6 @@ from dearig.errors import (
 )
 from dearig.model.control import HoldAnswer
 from dearig.output_state import Known, OutputState
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.high_voltage.status import ARMED_FOR, HighVoltageStatus, LatchedAlarm
 from dearig.window.run.live import Live
@@ -95,7 +94,7 @@ class RunRequest:
     notes: str = ""
     seed: int = 0
     paced: bool = True
-    faults: FaultPlan | None = None
+    faults: tuple[str, ...] = ()
     overlay: OverlayModel | None = None
     marks: RunMarks | None = None
     waveform_digest: str = ""

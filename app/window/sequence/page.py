@@ -9,21 +9,19 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QMenu, QSplitter, QVBoxLayout, QWidget
 
 from dearig.config.presets import PRESETS
-from dearig.config.toml_input import read_text
 from dearig.errors import InputError
-from dearig.window.documents.dialogs import choose_file, save_as
-from dearig.window.documents.questions import confirm_discard, replace_or_tell
-from dearig.window.jobs.background import Background
+from dearig.window.documents.dialogs import choose_file
+from dearig.window.documents.file_actions import FileActions
 from dearig.window.kit.fields import in_words
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import Message, button, label, menu_button
+from dearig.window.kit.widgets import button, menu_button
 from dearig.window.sequence.draft import Draft, relative_csv
 from dearig.window.sequence.editor import SequenceEditor
 from dearig.window.sequence.preview_panel import PreviewPanel
 from dearig.window.session.layout_state import remember
 from dearig.window.session.page import Page
 from dearig.window.session.state import Preview, Session
-from dearig.window.session.text_file import OverwriteQuestion, Saved, TextFile
+from dearig.window.session.text_file import Saved, TextFile
 
 __all__ = ["SequencePage"]
 
@@ -45,13 +43,16 @@ class SequencePage(Page):
         # what an earlier session had without a file is in no file yet
         kept = session.sequence_path is None and toml not in PRESETS.values()
         file = TextFile("sequence", "" if kept else toml, session.sequence_path, folder)
-        session.recovery.note(file, toml)
         self.editor = SequenceEditor(toml, file)
         self.preview = PreviewPanel(session)
         self._sent = session.sequence_toml  # the text that this page gave to the session last
-        self._files = Background(self)
-        self._files.done.connect(self._file_done)
-        self._files.failed.connect(lambda sentence: self.trouble.show_text(sentence))
+        self.files = FileActions(
+            self, session, "sequence", lambda: (self.draft.toml, self.draft.file),
+            "Sequences (*.toml);;CSV (*.csv)",
+        )  # fmt: skip
+        self.files.chosen.connect(self.open_file)
+        self.files.opened.connect(self._opened)
+        self.files.saved.connect(self._saved)
         self.setAcceptDrops(True)
         self._build()
         self.editor.edited.connect(self._edited)
@@ -66,7 +67,7 @@ class SequencePage(Page):
         self._recent_changed()
         self.editor.fill(0)
         self._enable_undo()
-        self._show_file_name()
+        self.files.note()
         if session.preview is not None:
             self._preview_changed()
 
@@ -81,24 +82,8 @@ class SequencePage(Page):
         """Read a sequence (.toml), or add a waveform (.csv) as a segment."""
         if path.suffix.lower() == ".csv":
             self.add_csv(path)
-        elif self.may_replace():
-            self._files.start(lambda: (path, read_text(path, "sequence")))
-
-    def save_file(self, path: Path, replace: bool = False) -> None:
-        """Write the sequence to ``path``; an existing file is replaced as a whole.
-
-        Asks where another program has changed the file since it was opened, unless ``replace``.
-        """
-        file, text = self.draft.file, self.draft.toml
-
-        def write() -> Saved | OverwriteQuestion:
-            return file.write(path, text, replace)
-
-        self._files.start(write)
-
-    def may_replace(self) -> bool:
-        """Return True if the sequence has no unsaved changes, or the operator gives them up."""
-        return confirm_discard(self, self.session, self.draft.file, self.draft.toml)
+        else:
+            self.files.open(path)
 
     def take(self, toml: str, path: Path | None = None) -> bool:
         """Replace the sequence by ``toml`` of another page; False where the operator refuses.
@@ -106,7 +91,9 @@ class SequencePage(Page):
         ``path`` is the file that holds it, None where no file does.
         """
         folder = Path() if path is None else path.parent
-        return self.may_replace() and self._take(toml, TextFile("sequence", toml, path, folder))
+        return self.files.confirm_discard() and self._take(
+            toml, TextFile("sequence", toml, path, folder)
+        )
 
     def restore(self, toml: str, file: TextFile) -> None:
         """Replace the sequence by the unsaved one of an earlier window."""
@@ -123,50 +110,34 @@ class SequencePage(Page):
         """Replace the sequence by the preset ``name``."""
         self.take(PRESETS[name])
 
-    @Slot()
-    def save(self) -> None:
-        """Write the sequence to its file, or ask for one."""
-        path = self.draft.file.path
-        if path is None:
-            self._ask_save()
-        else:
-            self.save_file(path)
-
     def reset_layout(self) -> None:
         """Give every part its default size."""
         self.split.setSizes([400, 600])
 
     def close_work(self) -> None:
         """Wait for the thread."""
-        self._files.close()
+        self.files.close()
 
-    @Slot(object)
-    def _file_done(self, answer: tuple[Path, str] | Saved | OverwriteQuestion) -> None:
-        if isinstance(answer, OverwriteQuestion):
-            replace_or_tell(self, self.session, answer, self.save_file, self.trouble)
-            return
-        if isinstance(answer, Saved):
-            path = answer.path
-            answer.file.note(answer)
-            if all(segment.get("kind") != "csv" for segment in self.draft.segments):
-                answer.file.folder = path.parent
-            self.trouble.show_text("")
-            self._edited()  # the path may be another one
-            self.session.message.emit(f"Saved {path}")
-        else:
-            path, text = answer
-            if not self._take(text, TextFile("sequence", text, path, path.parent)):
-                return
-        self.session.add_recent(path)
+    @Slot(str, TextFile)
+    def _opened(self, toml: str, file: TextFile) -> None:
+        if self._take(toml, file) and file.path is not None:
+            self.session.add_recent(file.path)
+
+    @Slot(Saved)
+    def _saved(self, done: Saved) -> None:
+        if all(segment.get("kind") != "csv" for segment in self.draft.segments):
+            done.file.folder = done.path.parent
+        self._edited()  # the path may be another one
+        self.session.add_recent(done.path)
 
     def _take(self, toml: str, file: TextFile) -> bool:
         """Replace the sequence; return False, with a message, where ``toml`` is none."""
         try:
             self.editor.replace(toml, file)
         except InputError as error:
-            self.trouble.show_text(f"{error}. The previous sequence stays in use.")
+            self.files.trouble.show_text(f"{error}. The previous sequence stays in use.")
             return False
-        self.trouble.show_text("")
+        self.files.trouble.show_text("")
         self._edited()
         return True
 
@@ -188,8 +159,7 @@ class SequencePage(Page):
         self._sent = self.draft.toml
         self._enable_undo()
         session.set_sequence(self._sent, file.folder, file.path)
-        session.recovery.note(file, self._sent)
-        self._show_file_name()
+        self.files.note()
 
     def _enable_undo(self) -> None:
         self.undo_button.setEnabled(self.draft.can_undo)
@@ -241,11 +211,6 @@ class SequencePage(Page):
         played = preview.segments[1:-1][self.editor.chosen_segments()]  # without the rests
         self.preview.plots.choose((played[0][1], played[-1][2]) if played else None)
 
-    def _show_file_name(self) -> None:
-        file = self.draft.file
-        self.file_name.setText(file.name(self.draft.toml))
-        self.file_name.setToolTip(file.tip)
-
     @Slot()
     def _theme_changed(self) -> None:
         self.editor.set_fault_colour(self.session.theme.bad)
@@ -265,8 +230,7 @@ class SequencePage(Page):
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.setSpacing(SPACE)
         outer.addLayout(self._tool_bar())
-        self.trouble = Message()
-        outer.addWidget(self.trouble)
+        outer.addWidget(self.files.trouble)
         self.split = QSplitter(Qt.Orientation.Horizontal)
         self.split.setChildrenCollapsible(False)
         self.split.addWidget(self.editor)
@@ -286,9 +250,10 @@ class SequencePage(Page):
         self.recent_button = menu_button("&Recent", "Sequence files used lately", self.recent)
         for words, tip, key, done in (
             ("&Open …", "Read a sequence or a CSV waveform; files can be dropped here", "Ctrl+O",
-             self._ask_open),
-            ("&Save", "Write the sequence to its file", "Ctrl+S", self.save),
-            ("Save &as …", "Write the sequence to another file", "Ctrl+Shift+S", self._ask_save),
+             self.files.ask_open),
+            ("&Save", "Write the sequence to its file", "Ctrl+S", self.files.save),
+            ("Save &as …", "Write the sequence to another file", "Ctrl+Shift+S",
+             self.files.ask_save),
             ("Import &CSV …", "Add a waveform (columns of time and voltage) as a segment",
              "Ctrl+I", self._ask_csv),
         ):  # fmt: skip
@@ -307,21 +272,11 @@ class SequencePage(Page):
         row.addWidget(self.undo_button)
         row.addWidget(self.redo_button)
         row.addStretch(1)
-        self.file_name = label("", "muted")
-        row.addWidget(self.file_name)
+        row.addWidget(self.files.name)
         run = button("Go to R&un", "Go to the Run page, to arm and start it", primary=True)
         run.clicked.connect(lambda: self.go_to.emit("Run"))
         row.addWidget(run)
         return row
-
-    @Slot()
-    def _ask_open(self) -> None:
-        path = choose_file(
-            self, self.session, "Open a sequence", self.draft.file.folder,
-            "Sequences (*.toml);;CSV (*.csv)",
-        )  # fmt: skip
-        if path is not None:
-            self.open_file(path)
 
     @Slot()
     def _ask_csv(self) -> None:
@@ -331,16 +286,6 @@ class SequencePage(Page):
         )  # fmt: skip
         if path is not None:
             self.add_csv(path)
-
-    @Slot()
-    def _ask_save(self) -> None:
-        file = self.draft.file
-        start = file.path or file.folder
-        path = save_as(
-            self, self.session, "Save the sequence", start, "Sequences (*.toml)", ".toml"
-        )
-        if path is not None:
-            self.save_file(path)
 
 
 def _can_open(name: str) -> bool:

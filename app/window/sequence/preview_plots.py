@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from dearig.window.kit.theme import pen
 from dearig.window.plots.area import PlotArea
-from dearig.window.plots.curve import Curve
+from dearig.window.plots.curve import PlotCurve
 from dearig.window.plots.plot import Plot
 from dearig.window.session.state import Preview, Session
 
@@ -36,7 +36,7 @@ class PreviewPlots(PlotArea):
             name: self.add_plot(row, left=words)
             for row, (name, (words, _)) in enumerate(_PLOTS.items())
         }
-        self._curves: dict[str, Curve] = {
+        self._curves: dict[str, PlotCurve] = {
             name: self._plots[name].add_curve(words)
             for name, words in (
                 ("voltage", "planned"), ("displacement", "predicted"), ("field", "predicted"),

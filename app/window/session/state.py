@@ -24,14 +24,14 @@ from dearig.window.kit.theme import LIGHT, Theme
 from dearig.window.session.recovery import Recovery
 from dearig.window.session.settings import kept_text, kept_texts
 
-__all__ = ["Block", "Breach", "Preview", "Session"]
+__all__ = ["ArmingBlock", "Breach", "Preview", "Session"]
 
 _RECENT_MAX = 8
 FIRST_SEQUENCE = "thesis"
 
 
 @dataclass(frozen=True)
-class Block:
+class ArmingBlock:
     """Why the rig cannot be armed: a ``sentence``, and the title of the ``page`` that mends it."""
 
     sentence: str
@@ -133,7 +133,7 @@ class Session(QObject):
         self.armed = False
         self._feedforward = ""  # text of the sequence of the last hold
         self._hold: tuple[HoldPlan, tuple[object, ...]] | None = None
-        self._blocks: dict[str, Block] = {}
+        self._blocks: dict[str, ArmingBlock] = {}
         self.recovery = Recovery(settings, self)  #: unsaved sequence and rig file
 
     def set_address(self, address: str) -> None:
@@ -271,7 +271,7 @@ class Session(QObject):
         return self.armed or self.running
 
     @property
-    def blocks(self) -> dict[str, Block]:
+    def blocks(self) -> dict[str, ArmingBlock]:
         """What blocks arming, by key; the rig is armed only while this is empty."""
         return dict(self._blocks)
 
@@ -281,7 +281,7 @@ class Session(QObject):
         The ``sentence`` stands beside the Arm button, and on a banner of every page where ``page``
         is given, the title of the page that mends it.
         """
-        wanted = Block(sentence, page)
+        wanted = ArmingBlock(sentence, page)
         if self._blocks.get(key) != wanted:
             self._blocks[key] = wanted
             self.blocks_changed.emit()

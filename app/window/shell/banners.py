@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSi
 
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import ElidedLabel, button, label, set_role
-from dearig.window.session.state import Block
+from dearig.window.session.state import ArmingBlock
 
 __all__ = ["Banners"]
 
@@ -55,7 +55,7 @@ class Banners(QWidget):
         if self._texts.pop(key, None) is not None:
             self._refresh()
 
-    def show_blocks(self, blocks: dict[str, Block]) -> None:
+    def show_blocks(self, blocks: dict[str, ArmingBlock]) -> None:
         """Show what blocks arming, where it has a page."""
         self._blocks = {
             f"block {key}": (f"The rig cannot be armed: {block.sentence}", block.page)

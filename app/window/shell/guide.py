@@ -54,7 +54,7 @@ class _Documents(QTextBrowser):
         path = QUrl(name).path().removeprefix("/")
         if kind == QTextDocument.ResourceType.HtmlResource.value:
             page = page_at(path)
-            return None if page is None else to_html(page, _address)
+            return None if page is None else to_html(page, _address, formulas=False)
         if kind == QTextDocument.ResourceType.ImageResource.value:
             return _picture(file_at(path))
         return super().loadResource(kind, name)

@@ -11,7 +11,7 @@ from dearig.units import SHOWN
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import label, name_list
 from dearig.window.plots.area import PlotArea
-from dearig.window.plots.plot import Entry
+from dearig.window.plots.plot import LegendEntry
 from dearig.window.session.state import Session
 
 __all__ = ["BeforeAfterPlot"]
@@ -98,7 +98,7 @@ class BeforeAfterPlot(QWidget):
             if before.noise:
                 level = before.noise * shown.error_factor
                 error.add_levels(theme, "Noise floor", -level, level)
-                error.add_entry(Entry("noise floor", theme.muted, dashed=True))
+                error.add_entry(LegendEntry("noise floor", theme.muted, dashed=True))
         if before.noise:
             level = before.noise * shown.error_factor
             said.append(f"noise {significant(level)} {shown.error_unit}")

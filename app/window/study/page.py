@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
     QMenu,
-    QProgressBar,
     QRadioButton,
     QSpinBox,
     QTabWidget,
@@ -23,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.analysis.readings.compatibility import BRANCHES_MAX
-from dearig.analysis.study import Study, Task
+from dearig.analysis.study import Study, StudyRequest
 from dearig.errors import InputError
 from dearig.model.springs import SPRINGS
 from dearig.recording.files import check_output, replaced_when_done
@@ -31,8 +29,8 @@ from dearig.report.study_file import StudyEntry, make_study, open_study, studies
 from dearig.report.study_view import StudyView, view_of
 from dearig.window.documents.dialogs import save_as
 from dearig.window.jobs.background import Background
-from dearig.window.jobs.job_controls import splitter
-from dearig.window.jobs.worker import Job, Worker
+from dearig.window.jobs.job_controls import JobControls, splitter
+from dearig.window.jobs.worker import Worker
 from dearig.window.kit.browser import open_in_browser
 from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.theme import SPACE
@@ -69,7 +67,6 @@ class StudyPage(Page):
         self._session = session
         self._library = shared_library(session)
         self._worker = Worker(self)
-        self._job: Job | None = None
         self._shown: StudyView | None = None
         self._listing = Background(self)
         self._listing.done.connect(self._list_studies)
@@ -133,19 +130,11 @@ class StudyPage(Page):
 
         self.start = button("&Start", "Start the fit or the diagnosis, in the background", True)
         self.start.clicked.connect(self.begin)
-        self.cancel = button(
-            "&Cancel", "End early and keep the results so far; a second click ends at once"
+        self.job = JobControls(
+            self.start,
+            "&Cancel",
+            "End early and keep the results so far; a second click ends at once",
         )
-        self.cancel.clicked.connect(self._cancel)
-        self.bar = QProgressBar()
-        self.bar.setRange(0, 1000)
-        self.bar.setTextVisible(False)
-        self.bar.setFixedHeight(10)
-        self.stage = label(" ", "muted")
-        self.stage.setWordWrap(True)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.start, 2)
-        buttons.addWidget(self.cancel, 1)
 
         inner = QVBoxLayout()
         inner.addWidget(label("Recordings", "heading"))
@@ -157,9 +146,7 @@ class StudyPage(Page):
         inner.addWidget(self.diagnose)
         inner.addWidget(self.identify)
         inner.addLayout(form)
-        inner.addLayout(buttons)
-        inner.addWidget(self.bar)
-        inner.addWidget(self.stage)
+        inner.addWidget(self.job)
         frame = card(inner)
         frame.setMinimumWidth(frame.minimumSizeHint().width())
         return frame
@@ -228,9 +215,9 @@ class StudyPage(Page):
 
     # job
 
-    def task(self) -> Task:
+    def task(self) -> StudyRequest:
         """Return the task of the form."""
-        return Task(
+        return StudyRequest(
             diagnose=self.diagnose.isChecked(),
             train=self.recordings.train,
             validation=self.recordings.validation,
@@ -248,34 +235,17 @@ class StudyPage(Page):
     @Slot()
     def begin(self) -> None:
         """Start the job on the checked recordings."""
-        if self._job is not None:
+        if self.job.job is not None:
             return
         self.message.show_text("")
         task = self.task()
         self._label_previous()
-        self._job = self._worker.submit(make_study, task, self._session.folder, whole=task.diagnose)
-        self._job.progressed.connect(self._progressed)
-        self._job.finished.connect(self._finished)
-        self._job.failed.connect(self._failed)
-        self._job.cancelled.connect(self._cancelled)
-        self.bar.setValue(0)
-        self.stage.setText("Starting")
+        job = self._worker.submit(make_study, task, self._session.folder, whole=task.diagnose)
+        job.finished.connect(self._finished)
+        job.failed.connect(self._failed)
+        job.cancelled.connect(self._cancelled)
+        self.job.begin(job)
         self._enable()
-
-    @Slot()
-    def _cancel(self) -> None:
-        if self._job is not None:
-            self.stage.setText("Ending; click Cancel again to end at once")
-            self._job.cancel()
-
-    @Slot(str, float, float)
-    def _progressed(self, stage: str, fraction: float, left: float) -> None:
-        if self._job is None or self._job.asked_to_stop:
-            return
-        self.bar.setValue(round(1000 * fraction))
-        of = "" if self._job.whole else " of this step"
-        about = "" if math.isnan(left) else f", about {_roughly(left)}{of} left"
-        self.stage.setText(f"{stage}{about}")
 
     @Slot(object)
     def _finished(self, found: Study) -> None:
@@ -293,15 +263,11 @@ class StudyPage(Page):
         self.message.show_text("Cancelled; nothing was saved.", "warn")
 
     def _job_ended(self) -> None:
-        self._job = None
-        self.bar.setValue(0)
-        self.stage.setText(" ")
+        self.job.end()
         self._enable()
 
     def _enable(self) -> None:
-        busy = self._job is not None
-        self.start.setEnabled(not busy and bool(self.recordings.train))
-        self.cancel.setEnabled(busy)
+        self.start.setEnabled(self.job.job is None and bool(self.recordings.train))
         found = self._shown
         for made in (self.overlay_button, self.save_button, self.report_button):
             made.setEnabled(found is not None)
@@ -326,7 +292,7 @@ class StudyPage(Page):
         self._listing.close()
         self._opening.close()
         self.trends.close_work()
-        self._job = None
+        self.job.end()
         self._library.close()
 
     # result
@@ -397,7 +363,7 @@ class StudyPage(Page):
     @Slot(object)
     def _reopened(self, shown: StudyView) -> None:
         self.show_view(shown)
-        if self._job is not None:
+        if self.job.job is not None:
             self._label_previous()
 
     @Slot(str)
@@ -456,8 +422,3 @@ _INTRODUCTION = (
     "For these it proposes an experiment that separates them.",
     "Work runs in the background: you can record, or browse recordings, at the same time.",
 )
-
-
-def _roughly(left: float) -> str:
-    """Return a rough duration; ``left`` in s."""
-    return f"{max(round(left), 1)} s" if left < 100.0 else f"{round(left / 60.0)} min"

@@ -16,7 +16,7 @@ from dearig.units import SHOWN, readable
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import label, name_list
 from dearig.window.plots.area import PlotArea
-from dearig.window.plots.plot import Entry
+from dearig.window.plots.plot import LegendEntry
 from dearig.window.session.state import Session
 
 __all__ = ["ResidualPlots"]
@@ -146,7 +146,7 @@ class ResidualPlots(QWidget):
             if found.noise is not None:
                 level = found.noise * shown.error_factor
                 plot.add_levels(theme, "Noise floor", -level, level)
-                plot.add_entry(Entry("noise floor", theme.muted, dashed=True))
+                plot.add_entry(LegendEntry("noise floor", theme.muted, dashed=True))
 
     def _over_frequency(self, found: Residual) -> None:
         plot, theme, shown = self.density, self._session.theme, SHOWN[found.kind]
@@ -157,7 +157,7 @@ class ResidualPlots(QWidget):
             plot.add_curve(name, colour).set_points(trace.x, trace.y * shown.error_factor)
         if found.floor:
             plot.add_levels(theme, "Noise floor", math.log10(found.floor * shown.error_factor))
-            plot.add_entry(Entry("noise floor", theme.muted, dashed=True))
+            plot.add_entry(LegendEntry("noise floor", theme.muted, dashed=True))
 
     def _against(self, dependences: tuple[Dependence, ...], kind: str) -> None:
         plot, theme, shown = self.dependence, self._session.theme, SHOWN[kind]
@@ -181,7 +181,9 @@ class ResidualPlots(QWidget):
             plot.add_curve(name, colour, symbol=symbol).set_points(
                 found.at[good], values[good] * scale
             )
-        plot.add_entry(Entry("95 % band of noise", band.name(QColor.NameFormat.HexArgb), area=True))
+        plot.add_entry(
+            LegendEntry("95 % band of noise", band.name(QColor.NameFormat.HexArgb), area=True)
+        )
 
     def _stress(self, missing: MissingStress, kind: str) -> None:
         plot, theme = self.missing, self._session.theme

@@ -31,7 +31,7 @@ from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, label
 from dearig.window.plots.area import PlotArea
-from dearig.window.plots.plot import Entry
+from dearig.window.plots.plot import LegendEntry
 from dearig.window.session.state import Session
 
 __all__ = ["TrendsPanel"]
@@ -238,7 +238,9 @@ class TrendsPanel(QWidget):
         self.plot.addItem(pg.FillBetweenItem(*edges, brush=band), ignoreBounds=True)
         said = "common effect" if is_seen else "no effect is seen"
         self.plot.add_curve(said, colour).set_points(curve.x, curve.y)
-        self.plot.add_entry(Entry("95 % band", band.name(QColor.NameFormat.HexArgb), area=True))
+        self.plot.add_entry(
+            LegendEntry("95 % band", band.name(QColor.NameFormat.HexArgb), area=True)
+        )
         x, y = trend.adjusted(i)
         films = np.array(trend.model.films)[trend.model.sample.film]
         chosen = self.film.currentData()

@@ -18,7 +18,6 @@ from dearig.sim_backend.daqmx.card.hardware import (
     SINGLE_OWN_SENSE,
 )
 from dearig.sim_backend.daqmx.card.names import named, physical_names
-from dearig.sim_backend.daqmx.card.ranges import check_order, fitting_range, smallest_range
 from dearig.sim_backend.daqmx.card.scales import Scale
 from dearig.sim_backend.daqmx.card.sensors import Sensor
 from dearig.sim_backend.daqmx.card.state import CardState
@@ -60,7 +59,7 @@ class AnalogChannels:
         """
         with self._state.lock:
             may_add(task, Kind.AI)
-            taken = smallest_range(limits if scale is None else scale.limits(limits), INPUT_RANGES)
+            taken = _smallest_range(limits if scale is None else scale.limits(limits), INPUT_RANGES)
             made: list[AnalogInput] = []
             terminals = physical_names(physical, self._state.name)
             for terminal, called in named(task, self._state.name, terminals, name):
@@ -87,7 +86,7 @@ class AnalogChannels:
         with self._state.lock:
             may_add(task, Kind.AO)
             volts = limits if scale is None else scale.limits(limits)
-            taken = smallest_range(volts, (self._state.settings.card.ao_range_V,))
+            taken = _smallest_range(volts, (self._state.settings.card.ao_range_V,))
             made = []
             terminals = physical_names(physical, self._state.name)
             for terminal, called in named(task, self._state.name, terminals, name):
@@ -143,14 +142,14 @@ class AnalogChannels:
             present = channel.limits
             limits = (present[0] if low is None else low, present[1] if high is None else high)
             volts = limits if channel.scale is None else channel.scale.limits(limits)
-            channel.range = fitting_range(volts, self._offered(channel))
+            channel.range = _fitting_range(volts, self._offered(channel))
             channel.limits = limits
 
     def set_range(self, task: Task, channel: AnalogInput | AnalogOutput, limit: float) -> None:
         """Set the range of a channel to the smallest one that includes ``limit`` V."""
         with self._state.lock:
             not_set_while_running(task)
-            channel.range = fitting_range((-limit, limit), self._offered(channel))
+            channel.range = _fitting_range((-limit, limit), self._offered(channel))
 
     def set_scale(self, task: Task, channel: AnalogInput | AnalogOutput, name: str) -> None:
         """Set the custom scale of a channel; an empty ``name`` removes it."""
@@ -158,7 +157,7 @@ class AnalogChannels:
             not_set_while_running(task)
             scale = self._scales.find(name) if name else None
             volts = channel.limits if scale is None else scale.limits(channel.limits)
-            channel.range = fitting_range(volts, self._offered(channel))
+            channel.range = _fitting_range(volts, self._offered(channel))
             channel.scale = scale
 
     def _offered(self, channel: AnalogInput | AnalogOutput) -> Sequence[float]:
@@ -181,7 +180,7 @@ class AnalogChannels:
         """Refuse limits, scales and ranges of the channels of ``task`` that do not agree."""
         analog: list[AnalogInput | AnalogOutput] = [*task.inputs, *task.outputs]
         for channel in analog:
-            check_order(channel.limits)
+            _check_order(channel.limits)
             if channel.scale is not None:
                 channel.scale.check()
             if max(abs(v) for v in channel.volts) > channel.range * (1.0 + 1e-9):
@@ -190,3 +189,31 @@ class AnalogChannels:
                     f"Requested Values: {channel.volts}; Range: +-{channel.range:g} V; Channel "
                     f"Name: {channel.name}; Task Name: {task.name}",
                 )
+
+
+def _smallest_range(limits: tuple[float, float], offered: Sequence[float]) -> float:
+    """Return the smallest of the ranges ``offered`` in V that includes ``limits``."""
+    _check_order(limits)
+    return _fitting_range(limits, offered)
+
+
+def _check_order(limits: tuple[float, float]) -> None:
+    """Refuse limits whose minimum is not below their maximum."""
+    low, high = limits
+    if not low < high:
+        raise DaqmxError(
+            Code.MIN_NOT_LESS_THAN_MAX, f"Minimum Value: {low:g}; Maximum Value: {high:g}"
+        )
+
+
+def _fitting_range(limits: tuple[float, float], offered: Sequence[float]) -> float:
+    """Return the smallest of the ranges ``offered`` in V that includes both ``limits``."""
+    low, high = limits
+    fitting = [r for r in offered if max(abs(low), abs(high)) <= r * (1.0 + 1e-9)]
+    if not fitting:
+        raise DaqmxError(
+            Code.INVALID_VALUE,
+            f"Property: Max or Min; Requested Values: {low:g}, {high:g}; Largest Range: "
+            f"+-{max(offered):g} V",
+        )
+    return min(fitting)

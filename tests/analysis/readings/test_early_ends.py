@@ -22,7 +22,6 @@ from dearig.recording.reading.recording import RecordedEvent
 from dearig.report.as_json import outcome_json
 from dearig.report.text.sentences import identify_summary, warnings_of
 from dearig.report.text.tables import error_table
-from dearig.sim_backend.faults import FaultPlan
 from tests.tools.command import dearig, done
 
 LOBES = """\
@@ -41,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run that ended in an arc, and one that came to its end."""
     folder = tmp_path_factory.mktemp("early")
     loaded = parse_sequence(LOBES, "lobes", Path())
-    arc = RunOptions(faults=FaultPlan.parse(["arc@3.2"]))
+    arc = RunOptions(faults=["arc@3.2"])
     with pytest.raises(SafetyStop):
         record(loaded, "sim", RigFile(), folder / "arc.h5", arc)
     record(loaded, "sim", RigFile(), folder / "whole.h5", RunOptions(seed=1))

@@ -15,7 +15,7 @@ from dearig.analysis.readings import record
 from dearig.analysis.readings.opening import open_all
 from dearig.analysis.readings.record import Readings, read_all
 from dearig.analysis.simulate import simulate_model
-from dearig.analysis.study import Task, study
+from dearig.analysis.study import StudyRequest, study
 from dearig.analysis.summary import assess
 from dearig.analysis.validate import validate_model
 from dearig.config.modelfile import load_model, save_model
@@ -121,7 +121,7 @@ def test_diagnose_opens_and_inspects_each_file_once(folder, opens, inspected):
 
 
 def test_a_study_opens_and_inspects_each_file_once(folder, opens, inspected, tmp_path):
-    task = Task(False, (folder / "a.h5",), (folder / "b.h5",), branches=1)
+    task = StudyRequest(False, (folder / "a.h5",), (folder / "b.h5",), branches=1)
     study(task, tmp_path, lambda *_: None)
     assert opens == inspected == {"a.h5": 1, "b.h5": 1}
 

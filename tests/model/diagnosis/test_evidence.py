@@ -95,6 +95,16 @@ def test_probabilities_add_up_to_one_and_follow_the_evidence() -> None:
     assert ratio == pytest.approx(expected)
 
 
+def test_families_that_are_both_certain_share_a_probability_but_not_a_marginal() -> None:
+    both = replace(DRAG, effects=(*DRAG.effects, *CURVED.effects))
+    fits = [fit(PLAIN, 3.0), fit(DRAG, 2.0), fit(both, 1.0)]
+    judge = Judge(SETTINGS, fits[0])
+    shares, marginals = judge.probabilities(fits), judge.marginals(fits)
+    for family in ("drag", "sensor_nonlinearity"):
+        assert shares[family] == pytest.approx(0.5, abs=1e-3)
+        assert marginals[family] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_a_family_without_a_fit_is_taken_to_explain_nothing() -> None:
     baseline = fit(PLAIN, 1.0)
     judge = Judge(SETTINGS, baseline)

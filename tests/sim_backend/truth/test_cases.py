@@ -37,8 +37,8 @@ FAMILIES = {
     "unknown",
 }
 FORMS = [
-    pytest.param(family, form, id=f"{hand}-{family}-{form.__name__}")
-    for hand, families in cases.HANDS.items()
+    pytest.param(family, form, id=f"{generator}-{family}-{form.__name__}")
+    for generator, families in cases.GENERATORS.items()
     for family, forms in families.items()
     for form in forms
 ]
@@ -54,13 +54,15 @@ def test_every_family_has_forms_and_nothing_has_another_name():
     assert len(cases.FORMS[cases.UNKNOWN]) >= 5
 
 
-def test_the_hands_share_no_form_and_the_film_of_a_seed_is_one():
-    hands = [{p.values[1] for p in FORMS if p.id.startswith(hand)} for hand in cases.HANDS]
-    assert not hands[0] & hands[1]
+def test_the_generators_share_no_form_and_the_film_of_a_seed_is_one():
+    generators = [
+        {p.values[1] for p in FORMS if p.id.startswith(generator)} for generator in cases.GENERATORS
+    ]
+    assert not generators[0] & generators[1]
     for seed in range(5):
-        first, second = draw(seed), draw(seed, hand="second", noise="pink")
+        first, second = draw(seed), draw(seed, generator="second", noise="pink")
         assert first.network == second.network
-        assert (second.hand, second.noise) == ("second", "pink")
+        assert (second.generator, second.noise) == ("second", "pink")
         assert not second.effects or first.description != second.description
 
 
@@ -78,19 +80,19 @@ def test_an_address_says_hand_and_noise():
     assert cases.address_of(7) == "sim:7"
     assert cases.address_of(7, "second") == "sim:7:second"
     assert cases.address_of(7, noise="spikes") == "sim:7:spikes"
-    for hand in cases.HANDS:
+    for generator in cases.GENERATORS:
         for noise in NOISES:
-            _, *words = cases.address_of(7, hand, noise).split(":")[1:]
+            _, *words = cases.address_of(7, generator, noise).split(":")[1:]
             case = cases.case_of(7, words, THESIS_FILM, THESIS_LOAD)
-            assert (case.hand, case.noise) == (hand, noise)
-            assert case.description == draw(7, hand=hand).description
+            assert (case.generator, case.noise) == (generator, noise)
+            assert case.description == draw(7, generator=generator).description
 
 
 @pytest.mark.parametrize("words", [("third",), ("second", "second"), ("pink", "coarse"), ("",)])
 def test_words_that_are_no_hand_and_no_noise(words):
     with pytest.raises(ValueError, match="behind the seed stand one of first, second, one of"):
         cases.case_of(7, words, THESIS_FILM, THESIS_LOAD)
-    for how in ({"hand": "third"}, {"noise": "brown"}):
+    for how in ({"generator": "third"}, {"noise": "brown"}):
         with pytest.raises(ValueError, match="choose one of"):
             draw(7, **how)
 
@@ -136,11 +138,11 @@ def test_kinds_come_as_often_as_they_should():
     assert all(order.index(a) < order.index(b) for a, b in pairs)
 
 
-@pytest.mark.parametrize("hand", cases.HANDS)
+@pytest.mark.parametrize("generator", cases.GENERATORS)
 @pytest.mark.parametrize("kind", ["clean", "covered", "pair", *cases.FORMS])
-def test_a_kind_can_be_asked_for(kind, hand):
+def test_a_kind_can_be_asked_for(kind, generator):
     for seed in range(6):
-        families = draw(seed, kind, hand=hand).families
+        families = draw(seed, kind, generator=generator).families
         if kind in cases.FORMS:
             assert families == (kind,)
         else:

@@ -21,12 +21,11 @@ from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import CardSettings, LimitsSettings
 from dearig.errors import Interrupted
 from dearig.recording import open_recording
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.campaign.compute import ComputeProcess
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.state import HighVoltage
-from dearig.window.jobs.worker_process import Response
+from dearig.window.jobs.worker_process import WorkerMessage
 from dearig.window.run.runner import Play, Runner
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import TextFile
@@ -306,12 +305,12 @@ def test_a_killed_campaign_says_what_happened_and_what_its_start_does(
 def test_an_interlock_halts_until_a_person_says_what_was_seen(
     qtbot: QtBot, page: CampaignPage, runner: Runner, session: Session
 ) -> None:
-    page.faults = FaultPlan.parse(["arc@0.45"])
+    page.faults = ("arc@0.45",)
     begin(qtbot, page)
     ended(qtbot, runner)
     assert states(page)[0] == "stopped"
     surveyed(qtbot, page)
-    page.faults = None
+    page.faults = ()
     assert runner.status.alarm is not None
     runner.status.acknowledge("Ada")
     assert not page.controls.arm.isEnabled()
@@ -334,7 +333,7 @@ def test_what_is_computed_after_a_run_is_ended_by_stop_and_its_faults_are_noted(
     monkeypatch.setattr(apart, "_started", lambda: ours)
     stages: list[str] = []
 
-    def compute(*answers: Response) -> Computed:
+    def compute(*answers: WorkerMessage) -> Computed:
         for answer in answers:
             theirs.send(answer)
         return apart(
@@ -342,10 +341,13 @@ def test_what_is_computed_after_a_run_is_ended_by_stop_and_its_faults_are_noted(
         )
 
     done = Computed(numbers={"mu_0_kPa": 40.0})
-    assert compute(Response(1, "progress", ("fitting", 0.5)), Response(1, "done", done)) == done
+    assert (
+        compute(WorkerMessage(1, "progress", ("fitting", 0.5)), WorkerMessage(1, "done", done))
+        == done
+    )
     assert stages == ["fitting"]
     assert theirs.recv().given[1] == tmp_path / "a.h5"
-    assert compute(Response(2, "broken", ("an error", "trace"))).problems == ["an error"]
+    assert compute(WorkerMessage(2, "broken", ("an error", "trace"))).problems == ["an error"]
     interrupts.ask()
     with pytest.raises(Interrupted, match="at 0 V"):
         compute()

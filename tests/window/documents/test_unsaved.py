@@ -68,7 +68,7 @@ def test_a_signal_keeps_unsaved_work_for_the_next_start(
     assert again.sequence_page.draft.toml == session.sequence_toml == toml
     assert again.page(RigPage).text == rig
     assert session.rig_file.limits.voltage_max_kV == 5.0
-    assert again.sequence_page.file_name.text() == "● mine.toml (not saved)"
+    assert again.sequence_page.files.name.text() == "● mine.toml (not saved)"
     assert again.isWindowModified()
     again.offer_unsaved()
     assert len(answers.questions) == 2

@@ -212,16 +212,18 @@ def test_a_target_is_read_written_and_asked_for(
     qtbot: QtBot, page: FollowPage, tmp_path: Path, answers: Any
 ) -> None:
     path = tmp_path / "path.toml"
-    page.target.save_file(path)
-    qtbot.waitUntil(lambda: "path.toml" in page.target.file_name.text(), timeout=_PATIENCE)
+    page.target.files.write(path)
+    qtbot.waitUntil(lambda: "path.toml" in page.target.files.name.text(), timeout=_PATIENCE)
     assert path.read_text(encoding="utf-8") == UP_AND_DOWN
     page.target.edit.setPlainText(FAST)
     page.target.open_file(path)  # the answer is no
     assert "target path.toml (changed: segment 2 duration (s))" in answers.questions[0]
     assert page.target.toml == FAST
     path.write_text(f"{UP_AND_DOWN}# by another program\n", encoding="utf-8")
-    page.target.save_file(path)
-    qtbot.waitUntil(lambda: "nothing was written" in page.target.trouble.text(), timeout=_PATIENCE)
+    page.target.files.write(path)
+    qtbot.waitUntil(
+        lambda: "nothing was written" in page.target.files.trouble.text(), timeout=_PATIENCE
+    )
     assert path.read_text(encoding="utf-8").endswith("# by another program\n")
     answers.next = True
     table = tmp_path / "table.csv"

@@ -16,7 +16,6 @@ from pytestqt.qtbot import QtBot
 from dearig.output_state import Known, OutputState
 from dearig.recording import open_recording
 from dearig.recording.verify import verify
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage, kilovolts
 from dearig.window.high_voltage.status import HighVoltageStatus, LatchedAlarm
 from dearig.window.rig.page import RigPage
@@ -106,9 +105,9 @@ def test_an_interlock_latches_until_somebody_acknowledges_it(
 ) -> None:  # fmt: skip
     page, bar, session = window.run_page, window.bar, window.session
     plan_of(SHORT)
-    page.faults = FaultPlan.parse([ARC])
+    page.faults = (ARC,)
     play(qtbot, page)
-    page.faults = None
+    page.faults = ()
     path = next(session.folder.glob("*.h5"))
     assert "Stopped by an interlock" in bar.alarm.full_text
     assert bar.badge.state is HighVoltage.CONFIRMED  # the monitor was read after it

@@ -12,7 +12,6 @@ from pytestqt.qtbot import QtBot
 
 from dearig.recording import open_recording
 from dearig.recording.reading.marks import Mark, marks_in
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.alarms import AcknowledgeBar, AlarmLog, AlarmTable
 from dearig.window.recordings.page import RecordingsPage
 from dearig.window.run.page import RunPage
@@ -124,7 +123,7 @@ def test_alarms_of_a_run_have_time_level_and_acknowledgement(
     qtbot: QtBot, run_page: RunPage, plan_of: Callable[[str], None]
 ) -> None:
     plan_of(SHORT)
-    run_page.faults = FaultPlan.parse(("arc@0.45",))
+    run_page.faults = ("arc@0.45",)
     press(qtbot, run_page.arm_button)
     began = datetime.now().astimezone()
     with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):

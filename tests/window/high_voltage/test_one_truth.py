@@ -12,7 +12,7 @@ from dearig.acquisition.check import check_rig
 from dearig.config.rigfile import RigFile
 from dearig.output_state import Known, OutputState
 from dearig.window.high_voltage.state import HighVoltage
-from dearig.window.high_voltage.status import Reading
+from dearig.window.high_voltage.status import OutputReading
 from dearig.window.rig.page import RigPage
 from dearig.window.run.live import RunSnapshot
 from dearig.window.shell.frame import MainWindow
@@ -68,7 +68,7 @@ def test_the_number_at_rest_is_the_one_that_confirmed_zero_volts(
     plan_of(SHORT)
     play(qtbot, window)
     # as after an end without a ramp: the last sample was taken at full voltage
-    status.show_reading(Reading(4520.0, 0.4, 1.0))
+    status.show_reading(OutputReading(4520.0, 0.4, 1.0))
     status.set_output(OutputState(Known.CONFIRMED, time.time(), 60.0, tolerance=100.0))
     clock = status.output.time
     assert bar.badge.state is HighVoltage.CONFIRMED
@@ -97,7 +97,7 @@ def test_no_number_of_the_last_run_stands_under_the_next_one(
     assert page.controls.of_sample.text() == ""
     assert page.controls.time_left.text() == ""
     # between two of its runs, the last sample is not beside 0 V
-    status.show_reading(Reading(4520.0, 0.4, 1.0))
+    status.show_reading(OutputReading(4520.0, 0.4, 1.0))
     assert bar.monitor.text() == "4.52 kV"
     status.set_output(OutputState(Known.CONFIRMED, time.time(), 2.0, tolerance=100.0))
     status.set_between("the next run starts by itself")
@@ -162,7 +162,7 @@ def test_a_snapshot_does_not_bring_numbers_back(qtbot: QtBot, window: MainWindow
     """What is drawn late belongs to the run that it is of."""
     controls, status = window.run_page.controls, window.run_page.runner.status
     status.set_phase(HighVoltage.ON)
-    status.show_reading(Reading(4520.0, 0.4, 1.0))
+    status.show_reading(OutputReading(4520.0, 0.4, 1.0))
     controls.show_numbers(RunSnapshot(400, 1000, 1000.0, {"monitor": 4520.0}, (), ()))
     assert controls.numbers["monitor"].text == "4.520"
     assert controls.of_sample.text() == "now"

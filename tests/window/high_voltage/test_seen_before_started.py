@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from dearig.window.campaign.page import CampaignPage
-from dearig.window.high_voltage.responsiveness import REACTION
+from dearig.window.high_voltage.status import REACTION
 from dearig.window.shell.frame import MainWindow
 from tests.window.conftest import press
 

@@ -36,6 +36,7 @@ class Job(QObject):
     failed = Signal(str)
     cancelled = Signal()
     asked_to_stop = False
+    whole = True
 
     def cancel(self) -> None:
         self.asked_to_stop = True
@@ -94,7 +95,7 @@ def settled(dialog: ImportDialog, qtbot: QtBot) -> None:
     """Wait until the dialog has read what it was given."""
     dialog._later.setInterval(0)
     qtbot.waitUntil(
-        lambda: dialog._job is None and not dialog._later.isActive(),
+        lambda: dialog.job.job is None and not dialog._later.isActive(),
         timeout=PATIENCE,
     )
 
@@ -275,15 +276,15 @@ def test_cancel_ends_the_import_first_and_closes_the_dialog_then(
     qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
     job = worker.jobs[-1]
     job.progressed.emit("reading", 0.25, 12.0)
-    assert dialog.bar.value() == 250
-    assert dialog.stage.text() == "Reading, about 12 s left"
-    qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+    assert dialog.job.bar.value() == 250
+    assert dialog.job.stage.text() == "Reading, about 12 s left"
+    qtbot.mouseClick(dialog.job.cancel_button, Qt.MouseButton.LeftButton)
     assert job.asked_to_stop
     assert dialog.isVisible()
     job.cancelled.emit()
     assert dialog.said.text() == "Cancelled; nothing was written."
     assert dialog.start.isEnabled()
-    qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(dialog.job.cancel_button, Qt.MouseButton.LeftButton)
     assert not dialog.isVisible()
     assert list(session.folder.iterdir()) == []
 

@@ -12,7 +12,7 @@ import pytest
 
 from dearig.errors import InputError
 from dearig.progress import Progress
-from dearig.window.jobs.worker import Estimate, Job, Worker
+from dearig.window.jobs.worker import Job, TimeLeft, Worker
 
 # long enough for an interpreter to start on a busy machine
 _PATIENCE = 60_000
@@ -215,7 +215,7 @@ def test_close_leaves_no_process_and_no_thread(qtbot, tmp_path):
 
 
 def test_the_estimate_is_that_of_the_stage():
-    estimate = Estimate()
+    estimate = TimeLeft()
     assert estimate.left("search", 0.0, 0.0) is None
     assert estimate.left("search", 0.01, 2.0) is None  # too little to tell
     assert estimate.left("search", 0.25, 5.0) == pytest.approx(15.0)

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QApplication
 
 from dearig.window.kit.theme import DARK, LIGHT
 from dearig.window.plots.area import PlotArea
-from dearig.window.plots.curve import Curve, cut_lines
+from dearig.window.plots.curve import PlotCurve, cut_lines
 from dearig.window.plots.plot import AxisText, Plot
 from dearig.window.session.state import Session
 
@@ -322,7 +322,7 @@ def test_zoom_of_another_axis_does_not_end_following(show) -> None:
 # curves
 
 
-def drawn(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+def drawn(curve: PlotCurve) -> tuple[np.ndarray, np.ndarray]:
     return curve.getData()
 
 

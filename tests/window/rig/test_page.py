@@ -145,7 +145,7 @@ def test_unsaved_changes_of_the_rig_file_are_named_before_they_are_lost(
     page.set_value("limits", "voltage_max_kV", 5.0)
     text = page.text
     answers.next = False
-    page.open_file(tmp_path / "rig.toml")
+    page.files.open(tmp_path / "rig.toml")
     page._ask_defaults()
     assert page.text == text
     assert all("limits: voltage max (kV)" in question for question in answers.questions)
@@ -161,29 +161,29 @@ def test_a_file_with_faults_keeps_its_name_while_they_are_mended(
 ) -> None:
     path = tmp_path / "rig.toml"
     path.write_text("# ours\n[film]\nlength_mm = -1.0  # wrong\n")
-    page.open_file(path)
+    page.files.open(path)
     qtbot.waitUntil(lambda: "rig file" in page.session.blocks)
     assert not page.save_button.isEnabled()
     page.set_value("film", "length_mm", 70.0)
     assert page.session.blocks == {}
     assert page.session.rig_path == path
     with qtbot.waitSignal(page.session.message):
-        page.save()
+        page.files.save()
     assert path.read_text() == "# ours\n[film]\nlength_mm = 70.0  # wrong\n"
 
 
 def test_a_file_is_read_changed_and_saved(qtbot: QtBot, page: RigPage, tmp_path: Path) -> None:
     write_default(tmp_path / "rig.toml")
     with qtbot.waitSignal(page.session.rig_changed):
-        page.open_file(tmp_path / "rig.toml")
-    qtbot.waitUntil(lambda: "rig.toml" in page.file_name.text())
+        page.files.open(tmp_path / "rig.toml")
+    qtbot.waitUntil(lambda: "rig.toml" in page.files.name.text())
     field = line(page, "film", "length_mm")
     assert field.text() == "75"
     field.selectAll()
     qtbot.keyClicks(field, "80.5")
-    assert "(not saved)" in page.file_name.text()
+    assert "(not saved)" in page.files.name.text()
     with qtbot.waitSignal(page.session.message):
-        page.save_file(tmp_path / "other.toml")
+        page.files.write(tmp_path / "other.toml")
     text = (tmp_path / "other.toml").read_text(encoding="utf-8")
     assert text == (tmp_path / "rig.toml").read_text(encoding="utf-8").replace(
         "length_mm = 75.0", "length_mm = 80.5"
@@ -201,6 +201,6 @@ def test_a_file_that_is_none_is_told(
     if text is not None:
         (tmp_path / "rig.toml").write_text(text)
     before = page.session.rig_file
-    page.open_file(tmp_path / "rig.toml")
-    qtbot.waitUntil(lambda: words in page.trouble.text() + page.state.text())
+    page.files.open(tmp_path / "rig.toml")
+    qtbot.waitUntil(lambda: words in page.files.trouble.text() + page.state.text())
     assert page.session.rig_file is before

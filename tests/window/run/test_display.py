@@ -13,7 +13,6 @@ from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import InterlockSettings, LimitsSettings
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.run.page import RunPage
 from dearig.window.sequence.planner import make_preview
@@ -153,7 +152,7 @@ def test_an_arc_stands_out_in_the_current_and_is_an_alarm(
 ) -> None:
     plan_of(SHORT)
     run_page.operator.setText("Ada")
-    run_page.faults = FaultPlan.parse(("arc@0.45",))
+    run_page.faults = ("arc@0.45",)
     press(qtbot, run_page.arm_button)
     with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):
         press(qtbot, run_page.start_button)

@@ -23,7 +23,6 @@ from pytestqt.qtbot import QtBot
 
 from dearig.recording import open_recording
 from dearig.recording.reading.recording import Recording
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.rig.page import RigPage
 from dearig.window.run.page import RunPage
@@ -228,7 +227,7 @@ def test_what_goes_wrong_is_said_and_the_rig_is_safe(
     qtbot: QtBot, run_page: RunPage, fault: str, headline: str, words: str
 ) -> None:
     page = run_page
-    page.faults = FaultPlan.parse([fault])
+    page.faults = (fault,)
     path = play(qtbot, page)
     assert page.result.text().startswith(headline)
     assert words in page.result.text() + " ".join(a.message for a in page.alarms.alarms)
@@ -236,7 +235,7 @@ def test_what_goes_wrong_is_said_and_the_rig_is_safe(
     recording = open_recording(path)
     assert recording.events
     assert recording.outcome != "finished"
-    page.faults = None
+    page.faults = ()
     assert not page.arm_button.isEnabled()  # until somebody has looked at the rig
     page.runner.status.acknowledge("Ada")
     assert open_recording(play(qtbot, page)).outcome == "finished"  # and it goes on

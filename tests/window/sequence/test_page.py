@@ -238,12 +238,12 @@ def test_a_file_is_saved_read_again_and_remembered(
     qtbot.keyClicks(field, "4")
     text = page.session.sequence_toml
     with qtbot.waitSignal(page.session.message):
-        page.save_file(tmp_path / "mine.toml")
+        page.files.write(tmp_path / "mine.toml")
     page.preset("thesis")
     page.open_file(tmp_path / "mine.toml")
     qtbot.waitUntil(lambda: page.session.sequence_path == tmp_path / "mine.toml")
     assert page.session.sequence_toml == text
-    assert page.file_name.text() == "mine.toml"
+    assert page.files.name.text() == "mine.toml"
     assert page.session.recent == [tmp_path / "mine.toml"]
     assert [action.text() for action in page.recent.actions()] == [str(tmp_path / "mine.toml")]
 
@@ -261,10 +261,10 @@ def test_a_second_save_keeps_comments_order_and_letters(
         field = page.editor.form.field("duration_s")
         field.clear()
         qtbot.keyClicks(field, duration)
-        assert page.file_name.text() == "● noted.toml (not saved)"
+        assert page.files.name.text() == "● noted.toml (not saved)"
         with qtbot.waitSignal(page.session.message):
-            page.save()
-        assert page.file_name.text() == "noted.toml"
+            page.files.save()
+        assert page.files.name.text() == "noted.toml"
     assert path.read_text() == noted.replace("duration_s = 1.0", "duration_s = 2.5", 1)
 
 
@@ -279,17 +279,17 @@ def test_a_file_that_another_program_has_changed_is_asked_about(
     path.write_text(other)
     page.editor.set_value("repeats", 2)
     answers.next = False
-    page.save()
-    qtbot.waitUntil(lambda: "nothing was written" in page.trouble.text())
+    page.files.save()
+    qtbot.waitUntil(lambda: "nothing was written" in page.files.trouble.text())
     assert "mine.toml was changed by another program" in answers.questions[0]
     assert path.read_text() == other
     answers.next = True
     with qtbot.waitSignal(page.session.message):
-        page.save()
+        page.files.save()
     assert path.read_text() == page.draft.toml
-    assert page.trouble.text() == ""
+    assert page.files.trouble.text() == ""
     with qtbot.waitSignal(page.session.message):
-        page.save()
+        page.files.save()
     assert len(answers.questions) == 2
 
 
@@ -323,7 +323,7 @@ def test_what_is_undone_belongs_to_its_own_file(
         qtbot.waitUntil(lambda name=name: page.session.sequence_path == tmp_path / f"{name}.toml")
     page.editor.undo()
     assert page.session.sequence_path == tmp_path / "rich.toml"
-    assert page.file_name.text() == "rich.toml"
+    assert page.files.name.text() == "rich.toml"
 
 
 def test_decimal_commas_are_shown_as_they_are_read(qtbot: QtBot, page: SequencePage) -> None:
@@ -379,7 +379,7 @@ def test_a_file_that_is_none_is_told_and_nothing_is_lost(
     if text is not None:
         (tmp_path / "bad.toml").write_text(text)
     page.open_file(tmp_path / "bad.toml")
-    qtbot.waitUntil(lambda: words in page.trouble.text())
+    qtbot.waitUntil(lambda: words in page.files.trouble.text())
     assert page.session.sequence_toml == PRESETS["thesis"]
 
 

@@ -20,7 +20,6 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.errors import SafetyStop
 from dearig.report.study_file import save_study
 from dearig.report.study_view import view_of
-from dearig.sim_backend.faults import FaultPlan
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
@@ -82,7 +81,7 @@ def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path
     page.branches.setValue(1)
 
     found = studied(page, qtbot)
-    assert not page.cancel.isEnabled()
+    assert not page.job.cancel_button.isEnabled()
     assert page.headline.text() == "lobes of 4.0 kV, 1 branch"
     assert "not used in the fit" in words(page.verdict)
     # what only a diagnosis has is not there
@@ -124,10 +123,12 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
 
     # a search that is cancelled at once leaves nothing either
     click(qtbot, page.start)
-    qtbot.waitUntil(lambda: page.bar.value() > 0 or page.message.text() != "", timeout=_PATIENCE)
+    qtbot.waitUntil(
+        lambda: page.job.bar.value() > 0 or page.message.text() != "", timeout=_PATIENCE
+    )
     assert page.message.text() == ""
-    click(qtbot, page.cancel)
-    click(qtbot, page.cancel)
+    click(qtbot, page.job.cancel_button)
+    click(qtbot, page.job.cancel_button)
     assert page.message.text() == "Cancelled; nothing was saved."
     assert not list(session.folder.glob("study-*"))
     assert page.start.isEnabled()
@@ -158,8 +159,8 @@ def test_a_study_is_reopened_and_the_old_result_is_labelled(session, keep, qtbot
     click(qtbot, page.start)
     assert page.headline.text() == f"Previous result: {shown}"
     assert page.about.text().startswith("This is study-1, ")
-    click(qtbot, page.cancel)
-    click(qtbot, page.cancel)
+    click(qtbot, page.job.cancel_button)
+    click(qtbot, page.job.cancel_button)
     assert page.message.text() == "Cancelled; nothing was saved."
     assert page.headline.text().startswith("Previous result: ")
 
@@ -168,7 +169,7 @@ def test_a_recording_that_ended_in_an_arc_is_marked_and_warned_of(session, keep,
     arc = session.folder / "arc.h5"
     loaded = parse_sequence(LOBES.format(top=6.0), "arc", Path())
     with pytest.raises(SafetyStop):
-        record(loaded, "sim", RigFile(), arc, RunOptions(faults=FaultPlan.parse(["arc@1.7"])))
+        record(loaded, "sim", RigFile(), arc, RunOptions(faults=["arc@1.7"]))
     page = open_page(session, keep, qtbot)
     name = page.recordings.item(0, 0)
     assert not page.warning.isVisible()

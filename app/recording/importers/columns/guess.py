@@ -11,8 +11,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.importers.columns.chosen import LIKELY, Chosen, Pick, own_name
-from dearig.recording.importers.columns.compression import as_compression
-from dearig.recording.importers.columns.proposal import Proposal, counts, is_even, values_in
+from dearig.recording.importers.columns.proposal import ColumnProposal, counts, is_even, values_in
 from dearig.recording.importers.quantities.clock_numbers import by_sixties, counts_days, epoch_unit
 from dearig.recording.importers.quantities.labels import (
     DIMENSIONS,
@@ -76,13 +75,13 @@ class Guess:
             use_monitor(self._chosen)
             return
         if not set(FILM) & there.keys() and not film and not any(map(self._asked, FILM)):
-            Proposal(self._chosen, self._labels, self._free, self._timed).fill()
+            ColumnProposal(self._chosen, self._labels, self._free, self._timed).fill()
             return
         self._check_sheared()
         self._take_one(LENGTHS, ("displacement",))
         self._take_one(PULLS, PULLS)
         self._take_if_sure("temperature")
-        as_compression(self._chosen, self._labels)
+        _as_compression(self._chosen, self._labels)
 
     def _check_sheared(self) -> None:
         """Raise ``InputError`` if all columns of strain and stress are of shear."""
@@ -359,3 +358,43 @@ def _likely(quantity: str) -> str:
 def _is_own(name: str, quantity: str) -> bool:
     """Return True if ``name`` is this program's name of a column of ``quantity``."""
     return any(name == target_name(quantity, unit) for unit in UNITS[DIMENSIONS[quantity]])
+
+
+_LENGTHS, _PULLS = ("strain", "true_strain", "displacement"), ("nominal_stress", "true_stress",
+                                                               "force")  # fmt: skip
+
+
+def _as_compression(chosen: Chosen, labels: Mapping[str, Label]) -> None:
+    """Make compression that ``chosen`` has as positive numbers negative, and say so.
+
+    Where only one of the two columns says that it is of compression and the other one is positive
+    too, its sign is asked for. Changes ``chosen``.
+    """
+    length = next((chosen.picked[q] for q in _LENGTHS if q in chosen.picked), None)
+    pull = next((chosen.picked[q] for q in _PULLS if q in chosen.picked), None)
+    picks = [pick for pick in (length, pull) if pick is not None]
+    named = [p for p in picks if labels[p.column].compressive and not p.behind and not p.is_open]
+    turned = [pick for pick in named if _is_positive(chosen, pick)]
+    for pick in turned:
+        scale = pick.scale
+        chosen.picked[pick.target.quantity] = replace(
+            pick, scale=Scale(-scale.times, scale.over, -scale.plus), behind="*-1"
+        )
+        chosen.notes.append(f"{pick.column!r} is positive in compression: its sign was changed")
+    for pick in picks if turned else ():
+        if pick not in named and not pick.behind and _is_positive(chosen, pick):
+            chosen.unsure.append(
+                f"{turned[0].column!r} is of compression, and {pick.column!r} is positive too and "
+                f"does not say so: give its sign, as "
+                f"{shlex.quote(f'{pick.target.name}={pick.column}*-1')} or *1"
+            )
+            chosen.picked[pick.target.quantity] = replace(
+                pick, behind="*FACTOR", doubt=pick.doubt or "scale"
+            )
+
+
+def _is_positive(chosen: Chosen, pick: Pick) -> bool:
+    """Return True if the largest value of a column is farther above 0 than the least is below."""
+    values = chosen.source.read([pick.column])[pick.column]
+    values = values[np.isfinite(values)]
+    return bool(values.size) and float(values.max()) > -float(values.min())

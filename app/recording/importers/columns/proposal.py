@@ -18,7 +18,7 @@ from dearig.recording.importers.quantities.labels import (
 )
 from dearig.recording.importers.source import listing
 
-__all__ = ["Proposal", "counts", "first_values", "is_even", "values_in"]
+__all__ = ["ColumnProposal", "counts", "first_values", "is_even", "values_in"]
 
 #: Smallest and largest stretch of a film, and what its first value differs from 1, in a proposal.
 STRETCH_MIN, STRETCH_MAX, AT_REST = 0.2, 15.0, 1e-3
@@ -28,7 +28,7 @@ READ_MAX, SHOWN_MAX, SHOWN = 64, 12, 3
 EVEN = 0.11
 
 
-class Proposal:
+class ColumnProposal:
     """Fills what ``chosen`` needs from units and values; its ``missing`` are what nothing says.
 
     The order of the columns counts for nothing.

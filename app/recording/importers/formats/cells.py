@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import datetime
 
-from dearig.recording.importers.formats.text_layout import Column
+from dearig.recording.importers.formats.text_layout import TextColumn
 from dearig.recording.importers.quantities.moments import OpenDatesError, day_first_of, moment_of
 from dearig.recording.importers.quantities.text_numbers import GROUPED, MINUS
 from dearig.recording.importers.source import NeedsOptionError
@@ -24,14 +24,14 @@ SHOWN = 30
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d+$)")
 
 
-def cell_of(cells: Sequence[str], column: Column) -> str:
+def cell_of(cells: Sequence[str], column: TextColumn) -> str:
     """Return the cell of ``column``; of a time of day, with the date that stands beside it."""
     if column.date_place is None:
         return cells[column.place]
     return f"{cells[column.date_place].removesuffix(' 00:00:00')} {cells[column.place]}".strip()
 
 
-def number_in(cell: str, column: Column) -> float | None:
+def number_in(cell: str, column: TextColumn) -> float | None:
     """Return the number in ``cell``; of a date and time, seconds. None if it is neither."""
     if column.since is not None:
         return _seconds(cell, column.since, column.day_first)
@@ -61,7 +61,7 @@ def _seconds(cell: str, since: datetime, day_first: bool) -> float | None:
         return None
 
 
-def with_order(column: Column, cells: Iterable[str]) -> Column:
+def with_order(column: TextColumn, cells: Iterable[str]) -> TextColumn:
     """Return ``column`` with the order of day and month that all its ``cells`` say.
 
     Raises ``NeedsOptionError`` where they leave it open.

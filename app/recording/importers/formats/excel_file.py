@@ -24,7 +24,7 @@ from dearig.recording.files import in_words, one_line
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.formats.columns import unseen
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
-from dearig.recording.importers.formats.text_layout import Column, Layout, layout_of
+from dearig.recording.importers.formats.text_layout import Layout, TextColumn, layout_of
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import PARSER_FAILURES, listing, printable
 
@@ -93,11 +93,11 @@ class ExcelFile(StoredColumns):
         self.block = [row for sheet in sheets for row in sheet.layout.block]
 
 
-def _load(sheet: _Sheet, column: Column) -> Callable[[], np.ndarray]:
+def _load(sheet: _Sheet, column: TextColumn) -> Callable[[], np.ndarray]:
     return lambda: sheet.values(column)
 
 
-def _cell(sheet: _Sheet, column: Column) -> Callable[[int], str]:
+def _cell(sheet: _Sheet, column: TextColumn) -> Callable[[int], str]:
     return lambda index: sheet.complaint(column, index)
 
 
@@ -115,7 +115,7 @@ class _Sheet:
         self._wrong: dict[tuple[int, int], str] = {}  # by place of the column and row of the sheet
         self._kept = np.empty(0, dtype=np.int64)  # rows of the sheet of what was read last
 
-    def values(self, column: Column) -> np.ndarray:
+    def values(self, column: TextColumn) -> np.ndarray:
         """Return the numbers (n,) of ``column``, not a number where a cell has none.
 
         Rows that are blank in the columns of the same table are left out.
@@ -142,7 +142,7 @@ class _Sheet:
             f"sheet {printable(self.name)!r}, row {self.layout.first + int(self._kept[index]) + 1}"
         )
 
-    def complaint(self, column: Column, index: int) -> str:
+    def complaint(self, column: TextColumn, index: int) -> str:
         """Return why the value ``index`` of ``column`` is no number."""
         row = int(self._kept[index])
         if column.place in self._formulas and (column.place, row) not in self._wrong:
@@ -174,7 +174,7 @@ class _Sheet:
                     self._wrong[column.place, at] = wrong
         return numbers
 
-    def _ordered(self, column: Column) -> Column:
+    def _ordered(self, column: TextColumn) -> TextColumn:
         """Return ``column`` with the order of day and month that all its texts say."""
         if not column.is_open:
             return column
@@ -220,7 +220,7 @@ def _reading(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _number(cell: Cell, column: Column) -> tuple[float, str]:
+def _number(cell: Cell, column: TextColumn) -> tuple[float, str]:
     """Return the number in ``cell`` and, where there is none, NaN and what is wrong."""
     if isinstance(cell, float):
         return cell, "" if math.isfinite(cell) else f"{cell} is not a finite number"
@@ -245,7 +245,7 @@ def _number(cell: Cell, column: Column) -> tuple[float, str]:
     return number, ""
 
 
-def _cell_of(row: Sequence[Cell], column: Column) -> Cell:
+def _cell_of(row: Sequence[Cell], column: TextColumn) -> Cell:
     """Return the cell of ``column``; of a time of day, with the date that stands beside it."""
     cell = row[column.place] if column.place < len(row) else None
     if column.date_place is None or cell is None:

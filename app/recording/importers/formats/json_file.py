@@ -17,7 +17,7 @@ from dearig.input_file import open_input, parse_json
 from dearig.recording.files import in_words
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
-from dearig.recording.importers.formats.text_layout import Column, encoding_of
+from dearig.recording.importers.formats.text_layout import TextColumn, encoding_of
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.moments import moment_of
 from dearig.recording.importers.source import printable
@@ -305,18 +305,18 @@ def _is_column(values: Sequence[Json]) -> bool:
     return 2 * sum(_column_of(value) is not None for value in there) > len(there)
 
 
-def _column_of(value: Json) -> Column | None:
+def _column_of(value: Json) -> TextColumn | None:
     """Return how a value is written that is a number, or a date and time; else None."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return _PLAIN
     if not isinstance(value, str) or len(value) > LOOKED_AT:
         return None
     if (since := moment_of(value)) is not None:
-        return Column("", 0, "s", since=since)
+        return TextColumn("", 0, "s", since=since)
     return next((c for c in (_PLAIN, _COMMA) if number_in(value.strip(), c) is not None), None)
 
 
-_PLAIN, _COMMA = Column("", 0), Column("", 0, decimal=",")
+_PLAIN, _COMMA = TextColumn("", 0), TextColumn("", 0, decimal=",")
 
 
 def _numbers(values: Sequence[Json]) -> np.ndarray:
@@ -332,7 +332,7 @@ def _numbers(values: Sequence[Json]) -> np.ndarray:
     return np.array([_number(value, column) for value in values], dtype=np.float64)
 
 
-def _number(value: Json, column: Column) -> float:
+def _number(value: Json, column: TextColumn) -> float:
     if isinstance(value, str):
         number = number_in(value.strip(), column)
         return math.nan if number is None else number

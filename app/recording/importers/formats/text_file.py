@@ -32,8 +32,8 @@ from dearig.recording.importers.formats.columns import NamedColumns, Overview
 from dearig.recording.importers.formats.text_blocks import BytesReader, blocks_of, halves_of
 from dearig.recording.importers.formats.text_layout import (
     HEAD_CHARACTERS,
-    Column,
     Layout,
+    TextColumn,
     cells_of,
     encoding_of,
     holds_data,
@@ -65,7 +65,7 @@ _QCODES = (
 _HEAD = 4 * HEAD_CHARACTERS  # bytes: a character has four at most
 
 
-class TextFile(NamedColumns[Column]):
+class TextFile(NamedColumns[TextColumn]):
     """The text file at ``path``. Raises ``InputError`` if it holds no table of numbers.
 
     ``names_line`` is the number of the line of names, from 1, where it is not found by itself. With
@@ -119,7 +119,7 @@ class TextFile(NamedColumns[Column]):
         # it costs a third of the parsing
         self._is_spaced = f"{self.layout.delimiter} " in head
         self._side_by_side = any(column.group for column in self.layout.columns)
-        self._wanted: list[Column] = []  # columns that were read last
+        self._wanted: list[TextColumn] = []  # columns that were read last
         #: places of columns of whole numbers in the sample, in which a block has a point or comma
         self._pointed: set[int] = set()
         self._decided: set[str] = set()  # columns whose signs the whole file has decided
@@ -201,7 +201,7 @@ class TextFile(NamedColumns[Column]):
                 break
         return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
 
-    def _read_rows(self, wanted: list[Column], skip: bool) -> _Table:
+    def _read_rows(self, wanted: list[TextColumn], skip: bool) -> _Table:
         """Return the rows of the columns ``wanted``; leave wrong ones out if ``skip``."""
         self.skipped, self._spans, self._wanted, self._pointed = [], [], wanted, set()
         self._leaves_out = skip
@@ -234,7 +234,7 @@ class TextFile(NamedColumns[Column]):
         self._said.append(f"{found.thousands!r} in column {name!r} stands between thousands")
         return True
 
-    def _ordered(self, name: str) -> Column:
+    def _ordered(self, name: str) -> TextColumn:
         """Return the column ``name``, with the order of day and month that the whole file says."""
         column = self._columns[name]
         if column.mixed is not None:
@@ -249,7 +249,7 @@ class TextFile(NamedColumns[Column]):
             self._columns[name] = column
         return column
 
-    def _cells(self, column: Column) -> Iterator[str]:
+    def _cells(self, column: TextColumn) -> Iterator[str]:
         """Yield the cells of ``column`` in all lines of the table."""
         last = max(column.place, column.date_place or 0)
         for _, block in self._blocks():
@@ -449,7 +449,7 @@ usecols=sorted(places), dtype=str, na_filter=False,
         cells = cells_of(content, self.layout.delimiter)
         return any(c.place < len(cells) and cells[c.place] for c in self._wanted)
 
-    def _row(self, content: str, wanted: Sequence[Column]) -> tuple[str, list[float], str]:
+    def _row(self, content: str, wanted: Sequence[TextColumn]) -> tuple[str, list[float], str]:
         """Return what is wrong with a line, empty if nothing is, its values, and in which column.
 
         The column is "" where the whole line is wrong.

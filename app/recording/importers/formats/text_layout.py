@@ -31,8 +31,8 @@ from dearig.recording.importers.quantities.units import unit_of
 
 __all__ = [
     "HEAD_CHARACTERS",
-    "Column",
     "Layout",
+    "TextColumn",
     "cells_of",
     "encoding_of",
     "holds_data",
@@ -65,7 +65,7 @@ _LEAST = 2  # lines of data in a row that begin a table
 
 
 @dataclass(frozen=True)
-class Column:
+class TextColumn:
     """A column of a text table: its name, the unit below the name, and its place from 0.
 
     ``own`` is its name without ``group``, the specimen or table that it belongs to where there are
@@ -108,7 +108,7 @@ class Layout:
     first: int
     names_line: int
     cells: int
-    columns: tuple[Column, ...]
+    columns: tuple[TextColumn, ...]
     block: tuple[tuple[str, ...], ...] = ()
     step_s: float | None = None
     notes: tuple[str, ...] = ()
@@ -438,7 +438,7 @@ class _Table:
 
     def _columns(
         self, names: list[str], units: list[str], groups: list[str]
-    ) -> tuple[list[Column], list[str]]:
+    ) -> tuple[list[TextColumn], list[str]]:
         """Return the columns with values in the sample, and notes on their numbers."""
         cells = {
             place: there
@@ -451,7 +451,7 @@ class _Table:
         dated = self._dates(cells, timed)
         numbers = {p: c for p, c in cells.items() if p not in timed and p not in dated.values()}
         signs = dict(zip(numbers, signs_of([*numbers.values()]), strict=True))
-        found: list[Column] = []
+        found: list[TextColumn] = []
         notes: list[str] = []
         for place, column in cells.items():
             name = names[place] if place < len(names) and names[place] else f"#{place + 1}"
@@ -466,7 +466,7 @@ class _Table:
                 first = day_first_or_open(column)
                 since = next(filter(None, (moment_of(cell, first) for cell in column)), None)
                 found.append(
-                    Column(
+                    TextColumn(
                         name, place, "s", since=since or timed[place], group=group,
                         day_first=first, is_open=any(map(is_open_date, column)),
                         date_place=dated.get(place),
@@ -480,7 +480,7 @@ class _Table:
                     f"the file says whether the comma is of decimals"
                 )
             found.append(
-                Column(
+                TextColumn(
                     name, place, unit, of.decimal, of.thousands, group=group,
                     undecided=not of.is_sure, mixed=of.mixed,
                 )
@@ -567,7 +567,7 @@ def _are_all_units(cells: Sequence[str]) -> bool:
     return all(not c or (not is_number(c) and unit_of(c) is not None) for c in cells)
 
 
-def _unique(columns: Sequence[Column]) -> tuple[Column, ...]:
+def _unique(columns: Sequence[TextColumn]) -> tuple[TextColumn, ...]:
     """Return ``columns`` with the group before their names, and the place behind repeated ones."""
     seen: Counter[str] = Counter()
     found = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "supply"]
@@ -13,6 +13,11 @@ EFFECT = Effect(
     family="amplifier",
     acts_on="amplifier",
     summary="the voltage at the film lags the command by a fixed time",
+    law=Law(
+        equations=(r"\tau \dot{V} = U - V",),
+        symbols=(r"\tau",),
+        source="a low-pass of first order",
+    ),
     parameters=(Parameter("time_constant", "s", (0.0, 1.0), "of the amplifier's lag", 5e-3, 0.0),),
     memory=1,
 )

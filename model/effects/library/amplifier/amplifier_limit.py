@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "supply"]
 
@@ -14,6 +14,11 @@ EFFECT = Effect(
     family="amplifier",
     acts_on="amplifier",
     summary="above one voltage the film gets less than was commanded",
+    law=Law(
+        equations=(r"V = U - s\,\operatorname{sign}(U) \max(|U| - V_k, 0)",),
+        symbols=("s", "V_k"),
+        source="a characteristic of two straight lines",
+    ),
     parameters=(
         Parameter("flattening", "", (0.0, 1.0), "relative loss of slope beyond the knee", 0.2, 0.0),
         Parameter(

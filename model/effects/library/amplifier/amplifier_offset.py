@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "supply"]
 
@@ -12,6 +12,11 @@ EFFECT = Effect(
     family="amplifier",
     acts_on="amplifier",
     summary="a constant voltage is added: a force proportional to the voltage itself",
+    law=Law(
+        equations=("V = U + V_0",),
+        symbols=("V_0",),
+        source="an additive constant",
+    ),
     parameters=(Parameter("offset", "V", (-2e3, 2e3), "of the output", 20.0, 0.0),),
 )
 

@@ -7,7 +7,7 @@ first-order lag does, and overshoots where the damping ratio z is below 0.7.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import swung
 
 __all__ = ["EFFECT", "supply"]
@@ -17,6 +17,11 @@ EFFECT = Effect(
     family="amplifier",
     acts_on="amplifier",
     summary="the voltage at the film lags and is rounded, or overshoots",
+    law=Law(
+        equations=(r"\tau^2 \ddot{V} + 2 \zeta \tau \dot{V} + V = U",),
+        symbols=(r"\tau", r"\zeta"),
+        source="a low-pass of second order",
+    ),
     parameters=(
         Parameter("time_constant", "s", (0.0, 0.5), "inverse angular frequency", 5e-3, 0.0),
         Parameter("damping", "", (0.05, 0.98), "ratio", 0.1, starts=(0.7,), logarithmic=True),

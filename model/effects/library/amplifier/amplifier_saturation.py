@@ -8,7 +8,7 @@ distinguishes the two.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "supply"]
 
@@ -17,6 +17,13 @@ EFFECT = Effect(
     family="amplifier",
     acts_on="amplifier",
     summary="the film gets less voltage than commanded, the more the higher the voltage",
+    law=Law(
+        equations=(
+            r"V = \frac{U}{\left(1 + n s \left(|U| / 8\,\mathrm{kV}\right)^n\right)^{1/n}}",
+        ),
+        symbols=("s", "n"),
+        source="C. Rapp, Proc. 2nd European Conf. Satellite Communications, 179 (1991)",
+    ),
     parameters=(
         Parameter("loss", "", (0.0, 0.5), "relative loss of voltage at 8 kV", 0.02, 0.0),
         Parameter(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import slewed
 
 __all__ = ["EFFECT", "supply"]
@@ -13,6 +13,17 @@ EFFECT = Effect(
     family="amplifier",
     acts_on="amplifier",
     summary="fast edges of the voltage reach the film late, slow changes on time",
+    law=Law(
+        equations=(
+            r"|\dot{V}| \le \frac{1}{\kappa}",
+            (
+                r"\dot{V} = \frac{1}{\kappa} \operatorname{sign}(U - V) \quad \mathrm{while} "
+                r"\quad V \ne U"
+            ),
+        ),
+        symbols=(r"\kappa",),
+        source="a limit of the slope",
+    ),
     parameters=(
         # shown by the steepest edges only: sought where it would touch so much of the time
         Parameter(

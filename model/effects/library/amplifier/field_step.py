@@ -6,7 +6,7 @@ From the time t_0 on the voltage is multiplied by 1 - s, over 20 ms so that a fi
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import switched
 
 __all__ = ["EFFECT", "supply"]
@@ -16,6 +16,18 @@ EFFECT = Effect(
     family="unknown",
     acts_on="electrode",
     summary="the force of the voltage drops at one moment and stays lower",
+    law=Law(
+        equations=(
+            r"V = \left(1 - s\,S(t - t_0)\right) U",
+            (
+                r"S(u) = \min\left(\max\left(\frac{u}{20\,\mathrm{ms}} + \frac{1}{2}, 0\right), "
+                r"1\right)"
+            ),
+        ),
+        symbols=("s", "t_0"),
+        source="a change at one moment",
+        where=(("S", "switch from 0 to 1 over 20 ms"),),
+    ),
     parameters=(
         Parameter("loss", "", (-0.5, 0.5), "relative loss of voltage", 5e-3, 0.0),
         Parameter(

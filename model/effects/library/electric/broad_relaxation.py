@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.library.electric.dielectric_relaxation import SETTLED
 from dearig.model.effects.shared.filters import lagged
 
@@ -22,6 +22,23 @@ EFFECT = Effect(
     family="dielectric_relaxation",
     acts_on="dielectric",
     summary="part of the force follows the voltage over decades of time, at any stretch",
+    law=Law(
+        equations=(
+            r"V_E^2 = \frac{V (V + d\,u)}{1 + g d}",
+            r"u = \frac{\sum_{i=0}^{6} w_i u_i}{\sum_{i=0}^{6} w_i}",
+            r"w_i = \frac{1}{\cosh((1 - \alpha) y_i) - \cos \pi\alpha}",
+            r"T \exp(y_i)\,\dot{u}_i = V - u_i",
+            r"y_i = \left(\frac{i}{3} - 1\right) W",
+        ),
+        symbols=("d", "T", r"\alpha", "W", "g"),
+        source="K. S. Cole and R. H. Cole, J. Chem. Phys. 9, 341 (1941)",
+        where=(
+            ("u_i", "slow polarisation with the time T exp(y_i), as a voltage"),
+            ("u", "their weighted mean"),
+            ("w_i", "density of the relaxation times"),
+            ("y_i", "logarithm of a relaxation time over T"),
+        ),
+    ),
     parameters=(
         Parameter(
             "strength", "", (-0.5, 2.0), "slow part of the permittivity over the fast", 0.01, 0.0

@@ -8,7 +8,7 @@ g = 1 eps is the permittivity at rest, with g = 0 that of fast fields: data shee
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "polarise"]
@@ -28,6 +28,12 @@ EFFECT = Effect(
     family="dielectric_relaxation",
     acts_on="dielectric",
     summary="part of the force follows the voltage with a delay, at any stretch",
+    law=Law(
+        equations=(r"V_E^2 = \frac{V (V + d\,u)}{1 + g d}", r"T \dot{u} = V - u"),
+        symbols=("d", "T", "g"),
+        source="P. Debye, Polar Molecules (1929)",
+        where=(("u", "slow polarisation, as a voltage"),),
+    ),
     parameters=(
         Parameter(
             "strength", "", (-0.5, 2.0), "slow part of the permittivity over the fast", 0.01, 0.0

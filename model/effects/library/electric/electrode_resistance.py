@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import CAPACITANCE, HELD
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import lagged
 from dearig.model.kinematics import thinning_squared
 
@@ -20,6 +20,14 @@ EFFECT = Effect(
     family="electrode_resistance",
     acts_on="electrode",
     summary="the film charges through a resistance: the force is delayed, more when stretched",
+    law=Law(
+        equations=(
+            r"\frac{\mathrm{d}(C V)}{\mathrm{d}t} = \frac{U - V}{R}",
+            r"C = C_0 \left(\frac{Z}{z}\right)^2",
+        ),
+        symbols=("R",),
+        source="charging of a capacitor through a resistor",
+    ),
     parameters=(
         Parameter("resistance", "ohm", (0.0, 5e9), "between the amplifier and the film", 1e7, 0.0),
     ),

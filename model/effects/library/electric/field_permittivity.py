@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import HELD, THICKNESS
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.kinematics import thinning_squared
 
 __all__ = ["EFFECT", "permittivity"]
@@ -17,6 +17,16 @@ EFFECT = Effect(
     family="permittivity",
     acts_on="dielectric",
     summary="the force is not proportional to the square of the field",
+    law=Law(
+        equations=(
+            r"\sigma_E = \frac{\sigma_M}{\max\left(1 - b (E/E_0)^2, 0.2\right)}",
+            r"E = \frac{V}{z}",
+            r"E_0 = 8\,\mathrm{MV/m}",
+        ),
+        symbols=("b",),
+        source="the first term of a series in the square of the field",
+        where=(("E_0", "field of reference"),),
+    ),
     parameters=(
         Parameter(
             "field_coefficient",

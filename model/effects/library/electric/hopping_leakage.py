@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Law
 from dearig.model.effects.library.electric.leakage import EFFECT as BY_TRAPS
 from dearig.model.effects.shared.conduction import HOPS, behind
 
@@ -18,6 +19,21 @@ EFFECT = replace(
     BY_TRAPS,
     name="hopping leakage",
     summary="the film draws a current at any voltage, exponentially more at a high one",
+    law=Law(
+        equations=(
+            r"V \left(1 + r\,g(e)\right) = U",
+            r"g(e) = \frac{\sinh(b e)}{e \sinh b}",
+            r"e = \frac{\lambda V}{8\,\mathrm{kV}}",
+            r"r = \frac{s}{(1 - s)\,g(1 - s)}",
+        ),
+        symbols=("s", "b"),
+        source="N. F. Mott and R. W. Gurney, Electronic Processes in Ionic Crystals (1940)",
+        where=(
+            ("g", "conductivity over that at e = 1"),
+            ("e", "field over that of 8 kV on the unstretched film"),
+            ("r", "resistance in front of the film over that of the film at e = 1"),
+        ),
+    ),
     parameters=(BY_TRAPS.parameters[0], replace(BY_TRAPS.parameters[1], starts=(1.0, 4.0))),
 )
 

@@ -8,7 +8,7 @@ voltages, and most at the peak.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.conduction import REMEMBERED, behind
 
 __all__ = ["EFFECT", "supply"]
@@ -18,6 +18,21 @@ EFFECT = Effect(
     family="leakage",
     acts_on="electrode",
     summary="the film gets less voltage than the amplifier supplies, the more the higher it is",
+    law=Law(
+        equations=(
+            r"V \left(1 + r\,g(e)\right) = U",
+            r"g(e) = \exp\left(b (e^n - 1)\right)",
+            r"e = \frac{\lambda V}{8\,\mathrm{kV}}",
+            r"r = \frac{s}{(1 - s)\,g(1 - s)}",
+        ),
+        symbols=("s", "b", "n"),
+        source="J. Frenkel, Phys. Rev. 54, 647 (1938)",
+        where=(
+            ("g", "conductivity over that at e = 1"),
+            ("e", "field over that of 8 kV on the unstretched film"),
+            ("r", "resistance in front of the film over that of the film at e = 1"),
+        ),
+    ),
     parameters=(
         Parameter(
             "loss",

@@ -6,7 +6,7 @@ Three Debye terms as of ``dielectric_relaxation``, each with its own strength, a
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.library.electric.dielectric_relaxation import SETTLED
 from dearig.model.effects.shared.filters import lagged
 
@@ -19,6 +19,21 @@ EFFECT = Effect(
     family="dielectric_relaxation",
     acts_on="dielectric",
     summary="parts of the force follow the voltage with three delays, at any stretch",
+    law=Law(
+        equations=(
+            r"V_E^2 = \frac{V (V + d_1 u_1 + d_2 u_2 + d_3 u_3)}{1 + g (d_1 + d_2 + d_3)}",
+            r"T \dot{u}_1 = V - u_1",
+            r"\frac{T}{s} \dot{u}_2 = V - u_2",
+            r"r T \dot{u}_3 = V - u_3",
+        ),
+        symbols=("d_1", "d_2", "d_3", "T", "r", "s", "g"),
+        source="a Prony series of P. Debye's terms, Polar Molecules (1929)",
+        where=(
+            ("u_1", "slow polarisation of the middle stage, as a voltage"),
+            ("u_2", "that of the sooner stage"),
+            ("u_3", "that of the later stage"),
+        ),
+    ),
     parameters=(
         Parameter(
             "strength",

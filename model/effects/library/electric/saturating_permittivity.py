@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "permittivity"]
 
@@ -17,6 +17,17 @@ EFFECT = Effect(
     family="permittivity",
     acts_on="dielectric",
     summary="the force of the field changes with the stretch, up to a limit",
+    law=Law(
+        equations=(
+            (
+                r"\sigma_E = \max\left(1 + \frac{a \delta}{\left(1 + |\delta / "
+                r"r|^n\right)^{1/n}}, 0.05\right) \sigma_M"
+            ),
+            r"\delta = \lambda - \lambda_0",
+        ),
+        symbols=("a", "r", "n"),
+        source="a slope that levels off, of the form of C. Rapp's (1991)",
+    ),
     parameters=(
         Parameter("strain_coefficient", "", (-100.0, 100.0), "slope at rest", 1.0, 0.0),
         Parameter(

@@ -8,7 +8,7 @@ stress is multiplied by 1 + a T.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "polarise", "soften"]
@@ -18,6 +18,15 @@ EFFECT = Effect(
     family="thermal",
     acts_on="environment",
     summary="the stiffness follows the square of the voltage, with a delay of seconds or minutes",
+    law=Law(
+        equations=(
+            r"\sigma = (1 + a \theta) \sigma_0",
+            r"\tau \dot{\theta} = \left(\frac{V}{5\,\mathrm{kV}}\right)^2 - \theta",
+        ),
+        symbols=("a", r"\tau"),
+        source="Newton's law of cooling",
+        where=((r"\theta", "warming over that under constant 5 kV"),),
+    ),
     parameters=(
         Parameter(
             "stiffening",

@@ -7,7 +7,7 @@ The network's stress is multiplied by 1 + a T + b T_2.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "polarise", "soften"]
@@ -17,6 +17,23 @@ EFFECT = Effect(
     family="thermal",
     acts_on="environment",
     summary="the stiffness follows the square of the voltage, in seconds and then in minutes",
+    law=Law(
+        equations=(
+            r"\sigma = (1 + a_1 \theta_1 + a_2 \theta_2) \sigma_0",
+            r"\tau_i \dot{\theta}_i = \left(\frac{V}{5\,\mathrm{kV}}\right)^2 - \theta_i",
+        ),
+        symbols=("a_1", "a_2", r"\tau_1", r"\tau_2"),
+        source="Newton's law of cooling, of two bodies",
+        where=(
+            (
+                r"\theta_i",
+                (
+                    "warming of the film (1) and of its surroundings (2) over that under "
+                    "constant 5 kV"
+                ),
+            ),
+        ),
+    ),
     parameters=(
         Parameter(
             "stiffening",

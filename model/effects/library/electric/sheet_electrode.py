@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from dearig.model.coefficients import CAPACITANCE, HELD
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Parameter
+from dearig.model.effects.description import Law, Parameter
 from dearig.model.effects.library.electric.electrode_resistance import EFFECT as LUMPED
 from dearig.model.effects.shared.filters import lagged
 from dearig.model.kinematics import thinning_squared
@@ -29,6 +29,28 @@ EFFECT = replace(
     LUMPED,
     name="sheet electrode",
     summary="the electrode charges as a sheet: late where it is far from the contact",
+    law=Law(
+        equations=(
+            r"V = \left(\frac{z}{Z}\right)^2 \sqrt{\sum_{i=1}^{3} w_i q_i^2}",
+            (
+                r"(1 - k) R C\,\dot{q}_i = \mu_i^2 \left( \left(\frac{Z}{z}\right)^2 U - q_i "
+                r"\right)"
+            ),
+            r"C = C_0 \left(\frac{Z}{z}\right)^2",
+            r"\mu_i \tan \mu_i = \beta",
+            r"w_i = \frac{2 \beta^2}{\mu_i^2 (\mu_i^2 + \beta^2 + \beta)} \quad (i \le 2)",
+            "w_3 = 1 - w_1 - w_2",
+            r"\beta = \frac{1 - k}{k}",
+        ),
+        symbols=("R", "k"),
+        source="H. S. Carslaw and J. C. Jaeger, Conduction of Heat in Solids, section 3.11",
+        where=(
+            ("q_i", "charge of mode i, as a voltage of the unstretched film"),
+            ("w_i", "share of mode i in the mean square of the voltage"),
+            (r"\mu_i", "root of number i"),
+            (r"\beta", "resistance of the sheet over that of the contact"),
+        ),
+    ),
     parameters=(
         replace(LUMPED.parameters[0], meaning="of contact and sheet, end to end"),
         Parameter(

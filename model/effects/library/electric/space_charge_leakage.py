@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dearig.model.compiled.jit import jit
+from dearig.model.effects.description import Law
 from dearig.model.effects.library.electric.leakage import EFFECT as BY_TRAPS
 from dearig.model.effects.shared.conduction import CROWDED, behind
 
@@ -22,6 +23,21 @@ EFFECT = replace(
     BY_TRAPS,
     name="space-charge leakage",
     summary="the film draws a current that grows with a power of the voltage",
+    law=Law(
+        equations=(
+            r"V \left(1 + r\,\lambda^{l + 2} g(e)\right) = U",
+            "g(e) = e^l",
+            r"e = \frac{\lambda V}{8\,\mathrm{kV}}",
+            r"r = \frac{s}{(1 - s)\,g(1 - s)}",
+        ),
+        symbols=("s", "l"),
+        source="P. Mark and W. Helfrich, J. Appl. Phys. 33, 205 (1962)",
+        where=(
+            ("g", "conductivity over that at e = 1"),
+            ("e", "field over that of 8 kV on the unstretched film"),
+            ("r", "resistance in front of the film over that of the film at e = 1"),
+        ),
+    ),
     parameters=(
         _LOSS,
         replace(

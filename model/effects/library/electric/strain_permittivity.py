@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "permittivity"]
 
@@ -16,6 +16,14 @@ EFFECT = Effect(
     family="permittivity",
     acts_on="dielectric",
     summary="the force of the field changes in proportion to the stretch",
+    law=Law(
+        equations=(
+            r"\sigma_E = \max(1 + a \delta, 0.05)\,\sigma_M",
+            r"\delta = \lambda - \lambda_0",
+        ),
+        symbols=("a",),
+        source="the first term of a series in the stretch",
+    ),
     parameters=(
         Parameter("strain_coefficient", "", (-10.0, 10.0), "relative change per stretch", 0.5, 0.0),
     ),

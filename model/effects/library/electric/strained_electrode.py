@@ -11,7 +11,7 @@ import math
 
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.library.electric.electrode_resistance import charged
 
 __all__ = ["EFFECT", "supply"]
@@ -21,10 +21,28 @@ EFFECT = Effect(
     family="electrode_resistance",
     acts_on="electrode",
     summary="the film charges through a resistance that changes with the stretch",
+    law=Law(
+        equations=(
+            r"\frac{\mathrm{d}(C V)}{\mathrm{d}t} = \frac{U - V}{R_0 \exp(g \delta)}",
+            r"C = C_0 \left(\frac{Z}{z}\right)^2",
+            r"\delta = \lambda - \lambda_0",
+        ),
+        symbols=("R_0", "g"),
+        source=(
+            "a resistance whose logarithm is proportional to strain: of films near percolation"
+        ),
+    ),
     parameters=(
-        Parameter("resistance", "ohm", (0.0, 5e9), "between the amplifier and the film", 1e7, 0.0),
         Parameter(
-            "gauge", "", (-60.0, 60.0), "factor of the resistance with stretch", 5.0, starts=(10.0,)
+            "resistance", "ohm", (0.0, 5e9), "between the amplifier and the film at rest", 1e7, 0.0
+        ),
+        Parameter(
+            "gauge",
+            "",
+            (-60.0, 60.0),
+            "relative change of the resistance per change of stretch",
+            5.0,
+            starts=(10.0,),
         ),
     ),
     memory=1,

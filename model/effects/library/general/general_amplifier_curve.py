@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.splines import step
 
 __all__ = ["EFFECT", "supply"]
@@ -45,6 +45,21 @@ EFFECT = Effect(
     family="amplifier",
     acts_on="amplifier",
     summary="the voltage at the film is a smooth curve of the command",
+    law=Law(
+        equations=(r"V = U + \operatorname{sign}(U) \sum_{i=1}^{6} a_i B_i(|U|)",),
+        symbols=(*(f"a_{i}" for i in range(1, 7)), r"V_f"),
+        source="J. O. Ramsay, Statistical Science 3, 425 (1988)",
+        where=(
+            (
+                "B_i",
+                (
+                    "smooth step from 0 to 1, the integral of a hat of area 1 with its knots "
+                    "at i - 2, i - 1 and i times V_f/5, none below 0"
+                ),
+            ),
+            ("a_i", "weight of step i"),
+        ),
+    ),
     parameters=(
         *(
             Parameter(f"gained_{i + 1}", "V", (-2e3, 2e3), f"at step {i + 1}", 10.0, 0.0)

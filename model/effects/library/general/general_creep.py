@@ -13,7 +13,7 @@ import numpy as np
 
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -37,6 +37,20 @@ EFFECT = Effect(
     family="creep",
     acts_on="film stress",
     summary="the film creeps over seconds to minutes, with relaxation times of any distribution",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \frac{\lambda_0}{\lambda} \sum_{i=1}^{10} \mu_i (e - q_i)",
+            r"\dot{q}_i = \frac{\lambda_0}{\lambda} \frac{e - q_i}{2^{i - 1}\,T}",
+            r"e = \ln\frac{\lambda}{\lambda_0}",
+        ),
+        symbols=(*(f"\\mu_{{{i}}}" for i in range(1, 11)), "T"),
+        source="J. C. Maxwell, Phil. Trans. R. Soc. 157, 49 (1867), as a Prony series",
+        where=(
+            ("e", "logarithmic strain from rest"),
+            ("q_i", "internal strain of branch i"),
+            (r"\mu_i", "modulus of branch i"),
+        ),
+    ),
     parameters=(
         *(
             Parameter(f"modulus_{i + 1}", "Pa", (0.0, 1e7), f"of branch {i + 1}", 300.0, 0.0)

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.hooks import FASTEST
 from dearig.model.effects.shared.splines import hat, step
 
@@ -56,6 +56,27 @@ EFFECT = Effect(
     family="drag",
     acts_on="load",
     summary="a force against the motion that grows with its rate, in any form",
+    law=Law(
+        equations=(
+            (
+                r"\sigma = \sigma_0 + \operatorname{sign}(\dot{\lambda}) \sum_{i=1}^{6} d_i "
+                r"B_i(|\dot{\lambda}|)"
+            ),
+        ),
+        symbols=tuple(f"d_{i}" for i in range(1, 7)),
+        source="J. O. Ramsay, Statistical Science 3, 425 (1988)",
+        where=(
+            (
+                "B_i",
+                (
+                    "smooth step from 0 to 1, the integral of a hat of area 1 with the knots i "
+                    "- 1, i and i + 1 of 0, 0.006, 0.018, 0.054, 0.162 and 0.486 1/s, none "
+                    "below the first; beyond the last it goes on with its slope"
+                ),
+            ),
+            ("d_i", "stress gained at step i"),
+        ),
+    ),
     parameters=tuple(
         Parameter(f"drag_{i + 1}", "Pa", (0.0, 1e5), f"gained at step {i + 1}", 4.0, 0.0)
         for i in range(_STEPS)

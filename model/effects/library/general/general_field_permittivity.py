@@ -12,7 +12,7 @@ import numpy as np
 
 from dearig.model.coefficients import HELD, THICKNESS
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.splines import step
 from dearig.model.kinematics import thinning_squared
 
@@ -44,6 +44,24 @@ EFFECT = Effect(
     family="permittivity",
     acts_on="dielectric",
     summary="the force is not proportional to the square of the field, in any form",
+    law=Law(
+        equations=(
+            r"\sigma_E = \max\left(1 + \sum_{i=1}^{6} a_i B_i(E^2), 0.05\right) \sigma_M",
+            r"E = \frac{V}{z}",
+        ),
+        symbols=(*(f"a_{i}" for i in range(1, 7)), r"E_f"),
+        source="J. O. Ramsay, Statistical Science 3, 425 (1988)",
+        where=(
+            (
+                "B_i",
+                (
+                    "smooth step from 0 to 1, the integral of a hat of area 1 with its knots "
+                    "at the squares of i - 2, i - 1 and i times E_f/5, none below 0"
+                ),
+            ),
+            ("a_i", "weight of step i"),
+        ),
+    ),
     parameters=(
         *(
             Parameter(

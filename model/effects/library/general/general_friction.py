@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.yield_elements import carry, first_loading, pull, slope
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -28,6 +28,22 @@ EFFECT = Effect(
     family="friction",
     acts_on="load",
     summary="a force against the motion that bends within micrometres before it slips",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \sum_{i=1}^{6} Y_i \frac{z_i}{s_i}",
+            r"\dot{z}_i = \dot{\lambda} \quad \mathrm{within} \quad |z_i| \le s_i",
+            r"s_i = 2.2^{i - 6}\,r",
+        ),
+        symbols=(*(f"Y_{{{i}}}" for i in range(1, 7)), "r"),
+        source=(
+            "V. Lampaert, J. Swevers and F. Al-Bender, IEEE Trans. Autom. Control 47, 683 (2002)"
+        ),
+        where=(
+            ("z_i", "stretch of element i, which yields at its threshold"),
+            ("s_i", "threshold of element i"),
+            ("Y_i", "yield stress of element i"),
+        ),
+    ),
     parameters=(
         *(
             Parameter(

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.yield_elements import carry, first_loading, pull, slope
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -29,6 +29,20 @@ EFFECT = Effect(
     family="rate_independent_hysteresis",
     acts_on="film stress",
     summary="hysteresis loops of any form, at any speed",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \sum_{i=1}^{10} Y_i \frac{z_i}{s_i}",
+            r"\dot{z}_i = \dot{\lambda} \quad \mathrm{within} \quad |z_i| \le s_i",
+            r"s_i = 1.7^{i - 10}\,r",
+        ),
+        symbols=(*(f"Y_{{{i}}}" for i in range(1, 11)), "r"),
+        source="A. Visintin, Differential Models of Hysteresis (1994)",
+        where=(
+            ("z_i", "stretch of element i, which yields at its threshold"),
+            ("s_i", "threshold of element i"),
+            ("Y_i", "yield stress of element i"),
+        ),
+    ),
     parameters=(
         *(
             Parameter(

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.library.electric.dielectric_relaxation import SETTLED
 from dearig.model.effects.shared.filters import lagged
 
@@ -35,6 +35,15 @@ EFFECT = Effect(
     family="dielectric_relaxation",
     acts_on="dielectric",
     summary="part of the force follows the voltage late, with times of any distribution",
+    law=Law(
+        equations=(
+            r"V_E^2 = V \left(V + \sum_{i=1}^{8} d_i (u_i - g V)\right)",
+            r"3^{i - 1}\,T \dot{u}_i = V - u_i",
+        ),
+        symbols=(*(f"d_{i}" for i in range(1, 9)), "T", "g"),
+        source="a Prony series of P. Debye's terms, Polar Molecules (1929)",
+        where=(("u_i", "slow polarisation of term i, as a voltage"), ("d_i", "strength of term i")),
+    ),
     parameters=(
         *(
             Parameter(f"strength_{i + 1}", "", (0.0, 1.0), f"of term {i + 1}", 3e-3, 0.0)

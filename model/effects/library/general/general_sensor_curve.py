@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.splines import step
 
 __all__ = ["EFFECT", "sense"]
@@ -42,6 +42,21 @@ EFFECT = Effect(
     family="sensor_nonlinearity",
     acts_on="sensor",
     summary="the reading is a smooth curve of the position",
+    law=Law(
+        equations=(r"r = x + \sum_{i=1}^{8} a_i B_i(x)",),
+        symbols=(*(f"a_{i}" for i in range(1, 9)), r"x_f"),
+        source="J. O. Ramsay, Statistical Science 3, 425 (1988)",
+        where=(
+            (
+                "B_i",
+                (
+                    "smooth step from 0 to 1, the integral of a hat of area 1 with its knots "
+                    "at i - 1, i and i + 1 times x_f/8"
+                ),
+            ),
+            ("a_i", "weight of step i"),
+        ),
+    ),
     parameters=(
         *(
             Parameter(f"error_{i + 1}", "m", (-1e-3, 1e-3), f"gained at step {i + 1}", 3e-6, 0.0)

@@ -22,7 +22,7 @@ import numpy as np
 
 from dearig.model.coefficients import EFFECTS_AT, REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.splines import step
 
 __all__ = ["EFFECT", "commit", "soften"]
@@ -48,6 +48,48 @@ EFFECT = Effect(
     family="softening",
     acts_on="film stress",
     summary="the film loses stress with its largest stretch so far, for good or below it",
+    law=Law(
+        equations=(
+            (
+                r"\sigma = \left(1 - \sum_{i=1}^{6} d_i B_i(m) - \frac{m}{m + 0.001} "
+                r"\sum_{j=1}^{5} r_j D_j(p)\right) \sigma_0"
+            ),
+            r"p = \frac{m - |\delta|}{m + w} \cdot \frac{R + w}{R}",
+            (
+                r"m(t) = \max_{t' \le t} |\delta|, \quad \mathrm{healing} \quad \dot{m} = "
+                r"\frac{|\delta| - m}{\tau}"
+            ),
+            r"\delta = \lambda - \lambda_0",
+        ),
+        symbols=(
+            *(f"d_{i}" for i in range(1, 7)),
+            *(f"r_{i}" for i in range(1, 6)),
+            "R",
+            "w",
+            r"\tau",
+        ),
+        source=(
+            "R. W. Ogden and D. G. Roxburgh, Proc. R. Soc. A 455, 2861 (1999), with the "
+            "splines of J. O. Ramsay, Statistical Science 3, 425 (1988)"
+        ),
+        where=(
+            (
+                "B_i",
+                (
+                    "smooth step from 0 to 1, the integral of a hat of area 1 with its knots "
+                    "at i - 1, i and i + 1 times R/6"
+                ),
+            ),
+            ("D_j", "the same with its knots at j - 2, j - 1 and j quarters, none below 0"),
+            (
+                "m",
+                ("largest change of stretch so far, which heals: it falls towards the change now"),
+            ),
+            ("p", "part of the way back from it"),
+            ("d_i", "loss that stays at step i"),
+            ("r_j", "loss that is regained at part j"),
+        ),
+    ),
     parameters=(
         *(
             Parameter(f"damage_{i}", "", (0.0, 0.5), f"loss that stays at step {i}", 5e-4, 0.0)

@@ -12,7 +12,7 @@ import numpy as np
 
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Parameter
+from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.splines import step
 
 __all__ = ["EFFECT", "permittivity"]
@@ -43,6 +43,26 @@ EFFECT = Effect(
     family="permittivity",
     acts_on="dielectric",
     summary="the force of the field changes with the stretch, in any form",
+    law=Law(
+        equations=(
+            (
+                r"\sigma_E = \max\left(1 + \sum_{i=1}^{6} a_i B_i(\lambda - \lambda_0), "
+                r"0.05\right) \sigma_M"
+            ),
+        ),
+        symbols=(*(f"a_{i}" for i in range(1, 7)), "r"),
+        source="J. O. Ramsay, Statistical Science 3, 425 (1988)",
+        where=(
+            (
+                "B_i",
+                (
+                    "smooth step from 0 to 1, the integral of a hat of area 1 with its knots "
+                    "at i - 2, i - 1 and i times r/5, none below 0"
+                ),
+            ),
+            ("a_i", "weight of step i"),
+        ),
+    ),
     parameters=(
         *(
             Parameter(

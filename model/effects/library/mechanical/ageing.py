@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "commit", "soften"]
 
@@ -18,6 +18,15 @@ EFFECT = Effect(
     family="softening",
     acts_on="film stress",
     summary="the film softens with every cycle, most in the first cycles",
+    law=Law(
+        equations=(
+            r"\sigma = \left(1 - a \left(1 - \exp(-p/p_0)\right)\right) \sigma_0",
+            r"p = \int_0^t |\dot{\lambda}|\,\mathrm{d}t",
+        ),
+        symbols=("a", "p_0"),
+        source="a loss in proportion to what is left of it",
+        where=(("p", "travel of the film in stretch, up and down, since the start"),),
+    ),
     parameters=(
         Parameter(
             "softening",

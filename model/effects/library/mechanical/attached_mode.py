@@ -10,7 +10,7 @@ import math
 
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import swung
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -20,6 +20,20 @@ EFFECT = Effect(
     family="unknown",
     acts_on="load",
     summary="a second mass rings at its own frequency after every edge",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + k (\delta - w)",
+            r"\ddot{w} = -2 \zeta \omega \dot{w} - \omega^2 (w - \delta)",
+            r"\omega = 2 \pi f",
+            r"\delta = \lambda - \lambda_0",
+        ),
+        symbols=("k", "f", r"\zeta"),
+        source="a mass on a spring with a damper",
+        where=(
+            ("w", "position of the mass, as a stretch from rest"),
+            (r"\omega", "angular frequency of the mass"),
+        ),
+    ),
     parameters=(
         Parameter(
             "stiffness",

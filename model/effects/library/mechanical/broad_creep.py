@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.creep import relaxed
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -19,6 +19,19 @@ EFFECT = Effect(
     family="creep",
     acts_on="film stress",
     summary="the film keeps creeping over decades of time",
+    law=Law(
+        equations=(
+            (
+                r"\sigma = \sigma_0 + \frac{\lambda_0}{\lambda} \sum_{i=0}^{5} \mu\,10^{-n i/2} "
+                "(e - q_i)"
+            ),
+            r"\dot{q}_i = \frac{\lambda_0}{\lambda} \frac{e - q_i}{10^{i/2}\,T}",
+            r"e = \ln\frac{\lambda}{\lambda_0}",
+        ),
+        symbols=(r"\mu", "T", "n"),
+        source="Maxwell branches whose moduli are a power of their times",
+        where=(("e", "logarithmic strain from rest"), ("q_i", "internal strain of branch i")),
+    ),
     parameters=(
         Parameter("modulus", "Pa", (0.0, 1e7), "of the first branch", 1e3, 0.0),
         Parameter(

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
@@ -25,6 +25,18 @@ EFFECT = Effect(
     family="rate_independent_hysteresis",
     acts_on="film stress",
     summary="hysteresis loops at any speed, narrow for small strokes and wide for large ones",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \frac{k}{24} \sum_{i=1}^{24} z_i",
+            (
+                r"\dot{z}_i = \dot{\lambda} \quad \mathrm{within} \quad |z_i| \le r \left(\frac{i "
+                r"- 1/2}{24}\right)^p"
+            ),
+        ),
+        symbols=("k", "r", "p"),
+        source="D. J. Segalman, J. Appl. Mech. 72, 752 (2005)",
+        where=(("z_i", "strain of element i, which slips at its threshold"),),
+    ),
     parameters=(
         Parameter(
             "stiffness", "Pa", (0.0, 1e6), "of all elements together before one slips", 3e3, 0.0

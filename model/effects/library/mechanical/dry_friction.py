@@ -12,7 +12,7 @@ for long; a film that slides is not damped by it.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import slid
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -22,6 +22,18 @@ EFFECT = Effect(
     family="friction",
     acts_on="load",
     summary="a constant force against the motion: the film lags at every turning point",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \frac{F}{p} (z + \tau \dot{z})",
+            r"\dot{z} = \dot{\lambda} - |\dot{\lambda}| \frac{z}{p}",
+        ),
+        symbols=("F", "p", r"\tau"),
+        source=(
+            "P. R. Dahl, Aerospace Corp. TOR-0158(3107-18)-1 (1968); C. Canudas de Wit et "
+            "al., IEEE Trans. Autom. Control 40, 419 (1995)"
+        ),
+        where=(("z", "deflection of the bristles, as a stretch"),),
+    ),
     parameters=(
         Parameter("friction", "Pa", (0.0, 2e4), "nominal stress while sliding", 50.0, 0.0),
         Parameter(

@@ -12,7 +12,7 @@ import math
 from dataclasses import replace
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Parameter
+from dearig.model.effects.description import Law, Parameter
 from dearig.model.effects.library.mechanical.dry_friction import EFFECT as DRY
 from dearig.model.effects.library.mechanical.dry_friction import stiffness
 from dearig.model.effects.shared.filters import slid
@@ -25,6 +25,22 @@ EFFECT = replace(
     DRY,
     name="easing friction",
     summary="friction that is larger at low speed: the film sticks and slips",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \frac{F}{p} (z + \tau \dot{z})",
+            r"\dot{z} = \dot{\lambda} - |\dot{\lambda}| \frac{z}{\rho}",
+            r"\rho = p \left(1 + \eta \exp\left(-(\dot{\lambda}/v)^2\right)\right)",
+        ),
+        symbols=("F", "p", r"\tau", r"\eta", "v"),
+        source=(
+            "C. Canudas de Wit, H. Olsson, K. J. Astrom and P. Lischinsky, IEEE Trans. "
+            "Autom. Control 40, 419 (1995)"
+        ),
+        where=(
+            ("z", "deflection of the bristles, as a stretch"),
+            (r"\rho", "deflection at which all of them slip"),
+        ),
+    ),
     parameters=(
         replace(_FRICTION, meaning="nominal stress while sliding fast"),
         replace(_PRESLIDING, starts=(1e-4, 5e-4)),

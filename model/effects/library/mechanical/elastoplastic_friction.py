@@ -13,7 +13,7 @@ import math
 from dataclasses import replace
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Parameter
+from dearig.model.effects.description import Law, Parameter
 from dearig.model.effects.library.mechanical.easing_friction import EFFECT as EASING
 from dearig.model.effects.library.mechanical.easing_friction import stiffness
 from dearig.model.effects.shared.filters import bent, bristles_slip
@@ -24,6 +24,29 @@ EFFECT = replace(
     EASING,
     name="elastoplastic friction",
     summary="friction that is larger at low speed and elastic for small swings",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \frac{F}{p} (z + \tau \dot{z})",
+            r"\dot{z} = \dot{\lambda} \left(1 - \xi s(\xi)\right)",
+            r"\xi = \frac{z \operatorname{sign} \dot{\lambda}}{\rho}",
+            (
+                r"s(\xi) = \begin{cases} 0 & \xi \le a \\ \frac{1}{2} - \frac{1}{2} \cos\left(\pi "
+                r"\frac{\xi - a}{1 - a}\right) & a < \xi < 1 \\ 1 & \xi \ge 1 \end{cases}"
+            ),
+            r"\rho = p \left(1 + \eta \exp\left(-|\dot{\lambda}/v|^d\right)\right)",
+        ),
+        symbols=("F", "p", r"\tau", r"\eta", "v", "a", "d"),
+        source=(
+            "P. Dupont, V. Hayward, B. Armstrong and F. Altpeter, IEEE Trans. Autom. Control "
+            "47, 787 (2002)"
+        ),
+        where=(
+            ("z", "deflection of the bristles, as a stretch"),
+            (r"\rho", "deflection at which all of them slip"),
+            (r"\xi", "deflection along the motion over that"),
+            ("s", "part of the travel that slips"),
+        ),
+    ),
     parameters=(
         *EASING.parameters,
         Parameter(

@@ -9,7 +9,7 @@ good part of the stroke, those of dry friction within a few micrometres.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import wound_on
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -19,6 +19,18 @@ EFFECT = Effect(
     family="rate_independent_hysteresis",
     acts_on="film stress",
     summary="hysteresis loops at any speed that open over a part of the stroke",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + Y b",
+            (
+                r"r\,\dot{b} = \dot{\lambda} \left(1 - |b|^n \left(1 - s + s "
+                r"\operatorname{sign}(b \dot{\lambda})\right)\right)"
+            ),
+        ),
+        symbols=("Y", "r", "n", "s"),
+        source="Y.-K. Wen, J. Eng. Mech. Div. ASCE 102, 249 (1976)",
+        where=(("b", "stress over the yield stress"),),
+    ),
     parameters=(
         Parameter(
             "yield_stress", "Pa", (0.0, 2e5), "stress far from the last reversal", 200.0, 0.0

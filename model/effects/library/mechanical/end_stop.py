@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import LENGTH, REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.hooks import FASTEST
 
 __all__ = ["EFFECT", "stiffness", "stress"]
@@ -19,6 +19,18 @@ EFFECT = Effect(
     family="unknown",
     acts_on="load",
     summary="a stress that sets in at one displacement and grows beyond it, at any speed",
+    law=Law(
+        equations=(
+            (
+                r"\sigma = \sigma_0 + k d \left(\frac{d L_1}{0.5\,\mathrm{mm}}\right)^{n - 1} "
+                r"\max\left(1 + c L_1 \dot{\lambda}, 0\right)"
+            ),
+            r"d = \max\left(\lambda - \lambda_0 - \frac{x_s}{L_1}, 0\right)",
+        ),
+        symbols=("k", "x_s", "n", "c"),
+        source="K. H. Hunt and F. R. E. Crossley, J. Appl. Mech. 42, 440 (1975)",
+        where=(("d", "depth of the contact, as a stretch"),),
+    ),
     parameters=(
         Parameter(
             "stiffness", "Pa", (0.0, 5e7), "stress per stretch, 0.5 mm beyond the onset", 2e4, 0.0

@@ -12,7 +12,7 @@ import math
 
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "commit", "soften"]
 
@@ -21,6 +21,23 @@ EFFECT = Effect(
     family="softening",
     acts_on="film stress",
     summary="the film stays softer once it has been stretched: the first lobe differs",
+    law=Law(
+        equations=(
+            r"\sigma = \left(1 - s \left(1 - (1 + b X)^{-1/b}\right)\right) \sigma_0",
+            r"X = \left(\frac{1}{r} \max_{t' \le t} |\lambda(t') - \lambda_0|\right)^n",
+        ),
+        symbols=("s", "r", "n", "b"),
+        source="C. Miehe, Eur. J. Mech. A 14, 697 (1995)",
+        where=(
+            (
+                "X",
+                (
+                    "largest change of stretch so far over the reach, to the power n; for b = "
+                    "0 the loss is 1 - exp(-X)"
+                ),
+            ),
+        ),
+    ),
     parameters=(
         Parameter(
             "softening",

@@ -7,7 +7,7 @@ than the record shows has the same effect: slow data do not distinguish the two.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "stiffness", "stress"]
 
@@ -16,6 +16,11 @@ EFFECT = Effect(
     family="drag",
     acts_on="load",
     summary="a force against the motion, proportional to its rate",
+    law=Law(
+        equations=(r"\sigma = \sigma_0 + d \dot{\lambda}",),
+        symbols=("d",),
+        source="a force in proportion to the rate (Stokes)",
+    ),
     parameters=(
         Parameter("drag", "Pa s", (0.0, 1e5), "nominal stress per rate of stretch", 300.0, 0.0),
     ),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import LENGTH, SECTION
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "inertia"]
 
@@ -18,6 +18,16 @@ EFFECT = Effect(
     family="load_inertia",
     acts_on="inertia",
     summary="a mass moves with the film: it rings after every edge of the voltage",
+    law=Law(
+        equations=(
+            (
+                r"\left(\frac{\rho L_1^2}{3} + \frac{m L_1}{L_2 Z}\right) \ddot{\lambda} = "
+                r"\frac{F}{L_2 Z} + \sigma_E - \sigma"
+            ),
+        ),
+        symbols=("m",),
+        source="Newton's second law",
+    ),
     parameters=(
         Parameter(
             "moving_mass",

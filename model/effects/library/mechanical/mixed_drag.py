@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Parameter
+from dearig.model.effects.description import Law, Parameter
 from dearig.model.effects.library.mechanical.linear_drag import EFFECT as LINEAR
 from dearig.model.effects.library.mechanical.power_drag import greatest_rate
 
@@ -20,6 +20,11 @@ EFFECT = replace(
     LINEAR,
     name="mixed drag",
     summary="a force against the motion that grows with its rate and with the square of the rate",
+    law=Law(
+        equations=(r"\sigma = \sigma_0 + \left(d + q |\dot{\lambda}|\right) \dot{\lambda}",),
+        symbols=("d", "q"),
+        source="P. Forchheimer, Z. Ver. Dtsch. Ing. 45, 1782 (1901)",
+    ),
     parameters=(
         *LINEAR.parameters,
         Parameter("quadratic", "Pa s^2", (0.0, 1e6), "nominal stress per rate squared", 5e3, 0.0),

@@ -12,7 +12,7 @@ import math
 
 from dearig.model.coefficients import HELD, REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.kinematics import strain_and_pull
 
 __all__ = ["EFFECT", "commit", "soften"]
@@ -22,6 +22,19 @@ EFFECT = Effect(
     family="softening",
     acts_on="film stress",
     summary="the film is softer below its largest stretch so far: the first lobe differs",
+    law=Law(
+        equations=(
+            r"\sigma = \left(1 - s \tanh \frac{I_m - I}{w (I_m - I_0 + 0.001)}\right) \sigma_0",
+            r"I_m = \max_{t' \le t} I(t')",
+        ),
+        symbols=("s", "w"),
+        source="R. W. Ogden and D. G. Roxburgh, Proc. R. Soc. A 455, 2861 (1999)",
+        where=(
+            ("I", "first invariant of the strain"),
+            ("I_0", "that at rest"),
+            ("I_m", "the largest so far, at least that at rest"),
+        ),
+    ),
     parameters=(
         Parameter(
             "softening",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.hooks import FASTEST
 
 __all__ = ["EFFECT", "stiffness", "stress"]
@@ -19,6 +19,16 @@ EFFECT = Effect(
     family="drag",
     acts_on="load",
     summary="a force against the motion that grows with a power of its rate",
+    law=Law(
+        equations=(
+            (
+                r"\sigma = \sigma_0 + d \left|\frac{\dot{\lambda}}{0.1\,\mathrm{s}^{-1}}\right|^n "
+                r"\operatorname{sign} \dot{\lambda}"
+            ),
+        ),
+        symbols=("d", "n"),
+        source="a power of the rate: 2 is Newton's drag, 1 Stokes's",
+    ),
     parameters=(
         Parameter("drag", "Pa", (0.0, 1e4), "nominal stress at a rate of 0.1/s", 50.0, 0.0),
         Parameter("exponent", "", (1.0, 3.0), "of the rate", 0.3, starts=(2.0, 1.5)),

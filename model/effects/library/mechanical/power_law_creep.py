@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.creep import relaxed
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -20,6 +20,27 @@ EFFECT = Effect(
     family="creep",
     acts_on="film stress",
     summary="the film creeps by a power of time: alike in every decade",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \frac{\lambda_0}{\lambda} \sum_{i=0}^{5} \mu_i (e - q_i)",
+            (
+                r"\mu_i = k \frac{a \ln 10}{\Gamma(1 + a)} "
+                r"\left(\frac{T_i}{1\,\mathrm{s}}\right)^{-a}"
+            ),
+            r"\dot{q}_i = \frac{\lambda_0}{\lambda} \frac{e - q_i}{T_i}",
+            r"T_i = 10^i \cdot 0.03\,\mathrm{s}",
+            r"e = \ln\frac{\lambda}{\lambda_0}",
+        ),
+        symbols=("k", "a"),
+        source="G. W. Scott Blair, J. Colloid Sci. 2, 21 (1947)",
+        where=(
+            ("e", "logarithmic strain from rest"),
+            ("q_i", "internal strain of branch i"),
+            (r"\mu_i", "modulus of branch i"),
+            ("T_i", "relaxation time of branch i"),
+            (r"\Gamma", "gamma function"),
+        ),
+    ),
     parameters=(
         Parameter(
             "modulus", "Pa", (0.0, 1e7), "relaxation modulus of the power law at 1 s", 3e3, 0.0

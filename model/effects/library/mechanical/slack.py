@@ -8,7 +8,7 @@ this.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "measured_stress"]
 
@@ -17,6 +17,17 @@ EFFECT = Effect(
     family="slack",
     acts_on="film stress",
     summary="the strip buckles in place of pushing: no stress on the way back",
+    law=Law(
+        equations=(
+            (
+                r"\sigma_c = \begin{cases} \sigma & \sigma > 0 \\ (1 - s) \sigma & "
+                r"\sigma \le 0 \end{cases}"
+            ),
+        ),
+        symbols=("s",),
+        source="buckling of a strip without bending stiffness",
+        where=((r"\sigma_c", "nominal stress that the load cell reads"),),
+    ),
     parameters=(
         Parameter(
             "looseness",

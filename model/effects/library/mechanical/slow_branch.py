@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.creep import relaxed
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -13,6 +13,16 @@ EFFECT = Effect(
     family="creep",
     acts_on="film stress",
     summary="the film keeps creeping with one more relaxation time",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + \frac{\lambda_0}{\lambda} \mu (e - q)",
+            r"\dot{q} = \frac{\lambda_0}{\lambda} \frac{e - q}{T}",
+            r"e = \ln\frac{\lambda}{\lambda_0}",
+        ),
+        symbols=(r"\mu", "T"),
+        source="J. C. Maxwell, Phil. Trans. R. Soc. 157, 49 (1867)",
+        where=(("e", "logarithmic strain from rest"), ("q", "internal strain of the branch")),
+    ),
     parameters=(
         Parameter("modulus", "Pa", (0.0, 1e7), "of the branch", 2e3, 0.0),
         Parameter(

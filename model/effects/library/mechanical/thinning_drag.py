@@ -8,7 +8,7 @@ so that the stress has a slope at rest. With n near 0 it is a friction that sets
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.hooks import FASTEST
 from dearig.model.effects.library.mechanical.power_drag import greatest_rate
 
@@ -19,6 +19,18 @@ EFFECT = Effect(
     family="drag",
     acts_on="load",
     summary="a force against the motion that grows with a power of its rate, below 1 or above",
+    law=Law(
+        equations=(
+            (
+                r"\sigma = \sigma_0 + d \frac{\dot{\lambda}}{r} \left(\frac{|\dot{\lambda}| + "
+                r"s}{r}\right)^{n - 1}"
+            ),
+            r"r = 0.1\,\mathrm{s}^{-1}",
+        ),
+        symbols=("d", "n", "s"),
+        source="the power law of W. Ostwald and A. de Waele, linear at small rates",
+        where=(("r", "rate of reference"),),
+    ),
     parameters=(
         Parameter("drag", "Pa", (0.0, 1e4), "nominal stress at a rate of 0.1/s", 20.0, 0.0),
         Parameter("exponent", "", (0.0, 2.0), "of the rate", 0.3, starts=(0.5, 0.2, 1.4)),

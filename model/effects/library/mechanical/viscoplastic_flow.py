@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
@@ -20,6 +20,15 @@ EFFECT = Effect(
     family="viscoplasticity",
     acts_on="film stress",
     summary="beyond a stress the film flows with a time of its own, and keeps a set",
+    law=Law(
+        equations=(
+            r"\sigma = \sigma_0 + Y \frac{z}{r}",
+            r"\dot{z} = \dot{\lambda} - \frac{1}{T} \max(|z| - r, 0) \operatorname{sign} z",
+        ),
+        symbols=("Y", "r", "T"),
+        source="G. Duvaut and J.-L. Lions, Les inequations en mecanique et en physique (1972)",
+        where=(("z", "elastic stretch of the element"),),
+    ),
     parameters=(
         Parameter("yield_stress", "Pa", (0.0, 2e5), "from which on the film flows", 150.0, 0.0),
         Parameter(

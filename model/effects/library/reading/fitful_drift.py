@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.compiled.jit import allocating, jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -53,6 +53,17 @@ EFFECT = Effect(
     family="drift",
     acts_on="sensor",
     summary="the reading drifts up and down many times, whatever the film does",
+    law=Law(
+        equations=(
+            (
+                r"r = x + \sum_{n=1}^{13} a_n \left(T_n\left(\frac{2 t}{30\,\mathrm{s}} - "
+                r"1\right) - T_n(-1)\right)"
+            ),
+        ),
+        symbols=tuple(f"a_{{{n}}}" for n in range(1, 14)),
+        source="a series of Chebyshev polynomials",
+        where=(("T_n", "Chebyshev polynomial of degree n"), ("a_n", "amplitude of degree n")),
+    ),
     parameters=tuple(
         Parameter(
             name, "m", _RANGE, f"amplitude of the {which} Chebyshev polynomial over 30 s", 3e-6, 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -12,6 +12,11 @@ EFFECT = Effect(
     family="drift",
     acts_on="sensor",
     summary="the reading drifts at a constant rate, whatever the film does",
+    law=Law(
+        equations=("r = x + d t",),
+        symbols=("d",),
+        source="a constant rate",
+    ),
     parameters=(Parameter("drift", "m/s", (-1e-4, 1e-4), "of the zero, per second", 1e-7, 0.0),),
 )
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.library.mechanical.ageing import commit
 
 __all__ = ["EFFECT", "commit", "soften"]
@@ -20,6 +20,15 @@ EFFECT = Effect(
     family="softening",
     acts_on="film stress",
     summary="the film softens with the logarithm of the number of cycles",
+    law=Law(
+        equations=(
+            r"\sigma = \left(1 - a \ln\left(1 + \frac{p}{p_0}\right)\right) \sigma_0",
+            r"p = \int_0^t |\dot{\lambda}|\,\mathrm{d}t",
+        ),
+        symbols=("a", "p_0"),
+        source="G. B. Derham and A. G. Thomas, Rubber Chem. Technol. 50, 397 (1977)",
+        where=(("p", "travel of the film in stretch, up and down, since the start"),),
+    ),
     parameters=(
         Parameter(
             "softening",

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -17,6 +17,11 @@ EFFECT = Effect(
     family="drift",
     acts_on="sensor",
     summary="the reading drifts to another zero and settles, whatever the film does",
+    law=Law(
+        equations=(r"r = x + d \left(1 - \exp(-t/\tau)\right)",),
+        symbols=("d", r"\tau"),
+        source="a relaxation of first order",
+    ),
     parameters=(
         Parameter("drift", "m", (-5e-3, 5e-3), "of the zero, final", 3e-6, 0.0),
         Parameter(

@@ -7,7 +7,7 @@ is a constant rate, n = 1/2 diffusion, n near 0 the logarithm of time.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -16,6 +16,11 @@ EFFECT = Effect(
     family="drift",
     acts_on="sensor",
     summary="the reading drifts, ever more slowly, whatever the film does",
+    law=Law(
+        equations=(r"r = x + d \frac{(1 + t/T)^n - 1}{(1 + 30\,\mathrm{s}/T)^n - 1}",),
+        symbols=("d", "T", "n"),
+        source="a power of time: 1/2 is diffusion",
+    ),
     parameters=(
         Parameter("drift", "m", (-5e-3, 5e-3), "of the zero within 30 s", 3e-6, 0.0),
         Parameter(

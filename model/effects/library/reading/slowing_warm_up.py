@@ -11,7 +11,7 @@ import math
 from dataclasses import replace
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Parameter
+from dearig.model.effects.description import Law, Parameter
 from dearig.model.effects.library.reading.warm_up import EFFECT as WARM_UP
 
 __all__ = ["EFFECT", "soften"]
@@ -22,6 +22,11 @@ EFFECT = replace(
     WARM_UP,
     name="slowing warm-up",
     summary="the stiffness changes by a power of time, whatever the film does",
+    law=Law(
+        equations=(r"\sigma = \left(1 + a \left(1 - (1 + t/\tau)^{-p}\right)\right) \sigma_0",),
+        symbols=("a", r"\tau", "p"),
+        source="relaxations whose rates are gamma distributed",
+    ),
     parameters=(
         _STIFFENING,
         replace(_TIME_CONSTANT, meaning="after which the change slows down", starts=(5.0, 20.0)),

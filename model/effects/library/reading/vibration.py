@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -14,6 +14,18 @@ EFFECT = Effect(
     family="interference",
     acts_on="sensor",
     summary="a line in the spectrum of the reading, whatever the voltage does",
+    law=Law(
+        equations=(
+            (
+                r"r = x + a_1 \cos \omega t + b_1 \sin \omega t + a_2 \cos 2\omega t + b_2 \sin "
+                r"2\omega t"
+            ),
+            r"\omega = 2 \pi f",
+        ),
+        symbols=("a_1", "b_1", "a_2", "b_2", "f"),
+        source="a Fourier series",
+        where=((r"\omega", "angular frequency"),),
+    ),
     parameters=(
         Parameter("cosine", "m", (-1e-3, 1e-3), "of the fundamental", 2e-6, 0.0),
         Parameter("sine", "m", (-1e-3, 1e-3), "of the fundamental", 2e-6, 0.0),

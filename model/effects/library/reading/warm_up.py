@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "soften"]
 
@@ -17,6 +17,11 @@ EFFECT = Effect(
     family="thermal",
     acts_on="environment",
     summary="the stiffness settles at another value with time, whatever the film does",
+    law=Law(
+        equations=(r"\sigma = \left(1 + a \left(1 - \exp(-t/\tau)\right)\right) \sigma_0",),
+        symbols=("a", r"\tau"),
+        source="Newton's law of cooling",
+    ),
     parameters=(
         Parameter("stiffening", "", (-0.5, 0.5), "final relative change of stress", 1e-3, 0.0),
         Parameter(

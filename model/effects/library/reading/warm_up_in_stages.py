@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "soften"]
 
@@ -18,6 +18,16 @@ EFFECT = Effect(
     family="thermal",
     acts_on="environment",
     summary="the stiffness changes with time, ever more slowly, whatever the film does",
+    law=Law(
+        equations=(
+            (
+                r"\sigma = \left(1 + a_1 \left(1 - \exp(-t/\tau)\right) + a_2 \left(1 - "
+                r"\exp(-t/(10 \tau))\right)\right) \sigma_0"
+            ),
+        ),
+        symbols=("a_1", "a_2", r"\tau"),
+        source="Newton's law of cooling, of two bodies",
+    ),
     parameters=(
         Parameter("stiffening", "", (-0.5, 0.5), "relative change of stress, first", 1e-3, 0.0),
         Parameter("later", "", (-0.5, 0.5), "relative change of stress, later", 1e-3, 0.0),

@@ -11,7 +11,7 @@ import math
 
 from dearig.model.coefficients import AIR_HUMIDITY
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.library.electric.electrode_resistance import charged
 
 __all__ = ["EFFECT", "breathe", "supply"]
@@ -21,6 +21,17 @@ EFFECT = Effect(
     family="humidity",
     acts_on="electrode",
     summary="the film charges through a resistance that follows the humidity of the room",
+    law=Law(
+        equations=(
+            (
+                r"\frac{\mathrm{d}(C V)}{\mathrm{d}t} = \frac{U - V}{R \exp\left(g \left(h - "
+                r"1/2\right)\right)}"
+            ),
+            r"C = C_0 \left(\frac{Z}{z}\right)^2",
+        ),
+        symbols=("R", "g"),
+        source="a resistance whose logarithm is proportional to humidity",
+    ),
     parameters=(
         Parameter("resistance", "ohm", (0.0, 5e9), "at a relative humidity of 50 %", 1e7, 0.0),
         Parameter(

@@ -10,7 +10,7 @@ import math
 
 from dearig.model.coefficients import AIR_HUMIDITY
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.conduction import REMEMBERED, behind
 from dearig.model.effects.shared.filters import lagged
 
@@ -21,6 +21,20 @@ EFFECT = Effect(
     family="humidity",
     acts_on="electrode",
     summary="the film gets less voltage than the amplifier supplies, the more the moister it is",
+    law=Law(
+        equations=(
+            r"V \left(1 + \frac{s}{1 - s} \exp(g w)\right) = U",
+            r"\tau \dot{w} = h - \frac{1}{2} - w, \quad w(0) = h(0) - \frac{1}{2}",
+        ),
+        symbols=("s", "g", r"\tau"),
+        source="J. Crank, The Mathematics of Diffusion, 2nd ed., section 4.3 (1975)",
+        where=(
+            (
+                "w",
+                ("moisture: the relative humidity with which the film is in equilibrium, less 1/2"),
+            ),
+        ),
+    ),
     parameters=(
         Parameter("loss", "", (0.0, 0.5), "relative loss of voltage at 50 % humidity", 0.02, 0.0),
         Parameter(

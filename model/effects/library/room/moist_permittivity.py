@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import AIR_HUMIDITY
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "breathe", "permittivity"]
@@ -17,6 +17,20 @@ EFFECT = Effect(
     family="humidity",
     acts_on="dielectric",
     summary="the permittivity follows the humidity of the room, slowly",
+    law=Law(
+        equations=(
+            r"\sigma_E = \max(1 + a w, 0.02)\,\sigma_M",
+            r"\tau \dot{w} = h - \frac{1}{2} - w, \quad w(0) = h(0) - \frac{1}{2}",
+        ),
+        symbols=("a", r"\tau"),
+        source="J. Crank, The Mathematics of Diffusion, 2nd ed., section 4.3 (1975)",
+        where=(
+            (
+                "w",
+                ("moisture: the relative humidity with which the film is in equilibrium, less 1/2"),
+            ),
+        ),
+    ),
     parameters=(
         Parameter(
             "gain",

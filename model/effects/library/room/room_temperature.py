@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import AIR_TEMPERATURE
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "at_rest", "soften"]
 
@@ -18,6 +18,12 @@ EFFECT = Effect(
     family="thermal",
     acts_on="environment",
     summary="the stiffness follows the temperature of the room, from recording to recording",
+    law=Law(
+        equations=(r"\sigma = \max\left(1 + a (\theta - \theta_{23}), 0.05\right) \sigma_0",),
+        symbols=("a",),
+        source="the first term of a series in the temperature",
+        where=((r"\theta", "temperature of the room"), (r"\theta_{23}", "23 degrees Celsius")),
+    ),
     parameters=(
         Parameter(
             "stiffening", "1/K", (-0.05, 0.05), "relative change of stress per kelvin", 4e-3, 0.0

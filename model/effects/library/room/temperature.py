@@ -7,7 +7,7 @@ network's stress is multiplied by 1 + a (theta - theta_0), with the thermometer'
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "soften"]
 
@@ -16,6 +16,15 @@ EFFECT = Effect(
     family="thermal",
     acts_on="environment",
     summary="the stiffness follows the recorded temperature",
+    law=Law(
+        equations=(r"\sigma = \max\left(1 + a (\theta - \theta_0), 0.05\right) \sigma_0",),
+        symbols=("a",),
+        source="the first term of a series in the temperature",
+        where=(
+            (r"\theta", "temperature of the room"),
+            (r"\theta_0", "that at the start of the recording"),
+        ),
+    ),
     parameters=(
         Parameter(
             "stiffening", "1/K", (-0.2, 0.2), "relative change of stress per kelvin", 1e-3, 0.0

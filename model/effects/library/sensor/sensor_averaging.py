@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import along_cubic
 
 __all__ = ["EFFECT", "sense"]
@@ -25,6 +25,11 @@ EFFECT = Effect(
     family="sensor_lag",
     acts_on="sensor",
     summary="the reading is a mean over a time window: late, and rounded at corners",
+    law=Law(
+        equations=(r"r(t) = \frac{1}{w} \int_{t - w}^{t} x(t')\,\mathrm{d}t'",),
+        symbols=("w",),
+        source="a moving average",
+    ),
     parameters=(Parameter("window", "s", (0.0, 2.0), "of the mean", 1e-2, 0.0),),
     # position, rate, integral and time at the reading before, and what was shown; then integrals
     # and positions at the ends of the parts

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -12,6 +12,11 @@ EFFECT = Effect(
     family="sensor_nonlinearity",
     acts_on="sensor",
     summary="the reading flattens beyond one displacement, at any speed",
+    law=Law(
+        equations=(r"r = x - s \max(x - x_k, 0)",),
+        symbols=("s", "x_k"),
+        source="a characteristic of two straight lines",
+    ),
     parameters=(
         Parameter("flattening", "", (0.0, 1.0), "relative loss of slope beyond the knee", 0.1, 0.0),
         Parameter(

@@ -6,7 +6,7 @@ The reading is x + q x^2; the linear term is the sensor's gain, which only a cal
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -15,6 +15,11 @@ EFFECT = Effect(
     family="sensor_nonlinearity",
     acts_on="sensor",
     summary="the reading is a quadratic function of the position, at any speed",
+    law=Law(
+        equations=(r"r = x + q\,x^2",),
+        symbols=("q",),
+        source="a term of a series in the position",
+    ),
     parameters=(Parameter("quadratic", "1/m", (-300.0, 300.0), "of the reading", 5.0, 0.0),),
 )
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import moved_along
 
 __all__ = ["EFFECT", "sense"]
@@ -25,6 +25,11 @@ EFFECT = Effect(
     family="sensor_lag",
     acts_on="sensor",
     summary="the reading is late by a fixed time and not rounded",
+    law=Law(
+        equations=("r(t) = x(t - D)",),
+        symbols=("D",),
+        source="a dead time",
+    ),
     parameters=(Parameter("delay", "s", (0.0, 1.0), "of the reading", 5e-3, 0.0),),
     # position, rate and time at the reading before, and what was shown; then positions and rates
     # at the ends of the parts

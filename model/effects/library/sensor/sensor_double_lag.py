@@ -7,7 +7,7 @@ rates. The delay is that of a first-order lag of 2 tau; corners are rounder.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 from dearig.model.effects.shared.filters import low_pass
 
 __all__ = ["EFFECT", "sense"]
@@ -17,6 +17,12 @@ EFFECT = Effect(
     family="sensor_lag",
     acts_on="sensor",
     summary="the reading lags by a fixed time and is rounded, as behind two filters",
+    law=Law(
+        equations=(r"\tau \dot{q} = x - q", r"\tau \dot{r} = q - r"),
+        symbols=(r"\tau",),
+        source="two low-passes of first order in series",
+        where=(("q", "output of the first low-pass"),),
+    ),
     parameters=(Parameter("time_constant", "s", (0.0, 0.5), "of each low-pass", 5e-3, 0.0),),
     memory=4,
 )

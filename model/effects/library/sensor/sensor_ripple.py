@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -17,6 +17,13 @@ EFFECT = Effect(
     family="sensor_nonlinearity",
     acts_on="sensor",
     summary="the reading has an error that is periodic along the travel",
+    law=Law(
+        equations=(
+            r"r = x + a \sin \frac{2 \pi x}{p} + b \left(1 - \cos \frac{2 \pi x}{p}\right)",
+        ),
+        symbols=("a", "b", "p"),
+        source="a Fourier series along the travel",
+    ),
     parameters=(
         Parameter("sine", "m", (-5e-4, 5e-4), "of the error", 5e-6, 0.0),
         Parameter("cosine", "m", (-5e-4, 5e-4), "of the error", 5e-6, 0.0),

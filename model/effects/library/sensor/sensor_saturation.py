@@ -6,7 +6,7 @@ A travel y beyond the knee reads y/(1 + y/s), half of it at y = s.
 from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.description import Effect, Law, Parameter
 
 __all__ = ["EFFECT", "sense"]
 
@@ -15,6 +15,12 @@ EFFECT = Effect(
     family="sensor_nonlinearity",
     acts_on="sensor",
     summary="beyond one displacement the reading falls behind, more and more, at any speed",
+    law=Law(
+        equations=(r"r = x - y + \frac{y}{1 + \kappa y}", r"y = \max(x - x_k, 0)"),
+        symbols=(r"\kappa", "x_k"),
+        source="a hyperbola beyond a knee",
+        where=(("y", "travel beyond the knee"),),
+    ),
     parameters=(
         Parameter(
             "inverse_range",

@@ -1,0 +1,1 @@
+"""Models for other programs: equations with numbers, a NumPy file, Prony series."""

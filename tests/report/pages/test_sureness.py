@@ -1,0 +1,32 @@
+"""How sure a diagnosis is of each family: the same in JSON and text."""
+
+from __future__ import annotations
+
+from dearig.report.as_json import diagnosis_json
+from dearig.report.text.diagnosis import summary
+from tests.tools.diagnosis import diagnose_outcome, finding
+
+
+def test_two_families_that_are_both_certain_are_said_to_be_certain() -> None:
+    both = finding(
+        families=(("sensor_lag", 0.5), ("drag", 0.49), ("none", 0.01)),
+        marginals=(("sensor_lag", 0.99), ("drag", 0.98), ("none", 0.01)),
+    )
+    outcome = diagnose_outcome(finding=both)
+    listed = diagnosis_json(outcome)["families"]
+    assert sum(f["probability"] for f in listed) == 1.0
+    assert [f["probability_missing"] for f in listed] == [0.99, 0.98, 0.01]
+    said = " ".join(summary(outcome))
+    assert "that sensor lag is among what is missing is 0.99" in said
+
+
+def test_a_name_stands_next_to_its_small_probability() -> None:
+    doubtful = finding(marginals=(("drag", 0.9), ("sensor_lag", 0.004)))
+    said = " ".join(summary(diagnose_outcome(finding=doubtful)))
+    assert "that sensor lag is among what is missing is 0.00" in said
+
+
+def test_what_the_search_did_not_say_is_null_and_not_said() -> None:
+    outcome = diagnose_outcome(finding=finding(families=(("sensor_lag", 1.0),)))
+    assert diagnosis_json(outcome)["families"][0]["probability_missing"] is None
+    assert "among what is missing" not in " ".join(summary(outcome))
