@@ -13,7 +13,15 @@ import numpy as np
 
 from dearig.errors import DearigError
 from dearig.model.readings.noise import LEAD_IN, slow_at_rest
-from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, STOPPED, Judgement, judge
+from dearig.model.verdict import (
+    NOT_CONFIRMED,
+    NOTHING_MISSING,
+    PARTLY_EXPLAINED,
+    STOPPED,
+    UNEXPLAINED,
+    Judgement,
+    judge,
+)
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
@@ -315,6 +323,11 @@ class DiagnoseOutcome:
     def verdict(self) -> str:
         """One of the constants of ``dearig.model.verdict``, as of ``judgement``."""
         return self.judgement.verdict
+
+    @property
+    def is_rejected(self) -> bool:
+        """Whether the final model leaves more than noise: intervals hold only if it is right."""
+        return self.verdict in (PARTLY_EXPLAINED, NOT_CONFIRMED, UNEXPLAINED)
 
     @property
     def _comparable(self) -> tuple[tuple[Comparison, Comparison], ...]:

@@ -234,5 +234,10 @@ def export_model(model: ModelSource, to: str, path: str | Path, *, overwrite: bo
     InputError
         If ``to`` is another word, the model cannot be read, or the file exists or cannot be
         written.
+
+    Examples
+    --------
+    >>> import dearig
+    >>> dearig.export_model("model.toml", "python", "model.py")
     """
     return write_export(read_model(model), to, path, overwrite)

@@ -306,6 +306,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "parameters": [_effect_number_json(e) for e in finding.final.estimates],
         "covariance": covariance_table(finding.final.covariance_names, finding.final.covariance),
         "uncertainty_budget": budget_table(finding.final.budget),
+        "intervals_conditional": outcome.is_rejected,
         "quality": list(outcome.quality),
         "notes": list(finding.notes),
         "interrupted": finding.interrupted,

@@ -169,7 +169,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         experiment_words=readable(_with_full_stop(outcome.experiment_words)),
         experiments=() if experiments is None else (experiments,),
         sequence="" if outcome.experiment is None else outcome.experiment.sequence.strip(),
-        parameters=estimate_table(finding.final),
+        parameters=estimate_table(finding.final, outcome.is_rejected),
         provenance=_provenance(outcome),
         film=kind == "film",
     )

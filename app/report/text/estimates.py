@@ -22,7 +22,13 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.results import Stage
     from dearig.model.fitting import Contribution, Estimate
 
-__all__ = ["effect_table", "estimate_table"]
+__all__ = ["CONDITIONAL_TEXT", "effect_table", "estimate_table"]
+
+#: Note of intervals under a model that leaves more than noise.
+CONDITIONAL_TEXT = (
+    "These data reject the model: the intervals hold only if it were right, and the true values "
+    "can lie outside."
+)
 
 
 def effect_table(outcome: DiagnoseOutcome) -> Table:
@@ -38,23 +44,33 @@ def effect_table(outcome: DiagnoseOutcome) -> Table:
             name = f"{step.effect}: {e.name.replace('_', ' ')}"
             rows.append(_estimate(e, name, detail, bool(final.budget)))
     shown = [e for step in outcome.finding.steps for e in step.estimates]
-    return _estimates("Fitted parameters", rows, shown, final.budget)
+    rejected = outcome.is_rejected
+    return _estimates("Fitted parameters", rows, shown, final.budget, rejected)
 
 
-def estimate_table(stage: Stage) -> Table:
-    """Return all parameters of a model."""
+def estimate_table(stage: Stage, rejected: bool = False) -> Table:
+    """Return all parameters of a model, which the data may have ``rejected``."""
     rows = [
         _estimate(e, symbol(e.name).replace("_", " "), e.note, bool(stage.budget))
         for e in stage.estimates
     ]
-    return _estimates("Parameters", rows, stage.estimates, stage.budget)
+    return _estimates("Parameters", rows, stage.estimates, stage.budget, rejected)
 
 
 def _estimates(
-    title: str, rows: Sequence[Row], shown: Sequence[Estimate], budget: Sequence[Contribution]
+    title: str,
+    rows: Sequence[Row],
+    shown: Sequence[Estimate],
+    budget: Sequence[Contribution],
+    rejected: bool,
 ) -> Table:
-    head = [("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", "")]
-    notes = []
+    head = [
+        ("", ""),
+        ("Value", ""),
+        ("Unit", ""),
+        ("95 % interval", "if right" if rejected else ""),
+    ]
+    notes = [CONDITIONAL_TEXT] if rejected and rows else []
     if budget and rows:
         head += BUDGET_HEAD
         notes.append(budget_text(budget))

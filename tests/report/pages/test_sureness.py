@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
+
 from dearig.report.as_json import diagnosis_json
 from dearig.report.text.diagnosis import summary
+from dearig.report.text.estimates import CONDITIONAL_TEXT, effect_table, estimate_table
 from tests.tools.diagnosis import diagnose_outcome, finding
 
 
@@ -30,3 +33,19 @@ def test_what_the_search_did_not_say_is_null_and_not_said() -> None:
     outcome = diagnose_outcome(finding=finding(families=(("sensor_lag", 1.0),)))
     assert diagnosis_json(outcome)["families"][0]["probability_missing"] is None
     assert "among what is missing" not in " ".join(summary(outcome))
+
+
+@pytest.mark.parametrize(
+    ("verdict", "rejected"),
+    [("explained", False), ("partly_explained", True), ("unexplained", True)],
+)
+def test_intervals_under_a_model_that_the_data_reject_are_marked(verdict, rejected) -> None:
+    outcome = diagnose_outcome(finding=finding(verdict=verdict))
+    assert outcome.verdict == verdict
+    assert diagnosis_json(outcome)["intervals_conditional"] is rejected
+    for table in (
+        effect_table(outcome),
+        estimate_table(outcome.finding.final, outcome.is_rejected),
+    ):
+        assert (CONDITIONAL_TEXT in table.note) is rejected
+        assert (("95 % interval", "if right") in table.head) is rejected
