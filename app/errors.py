@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from dearig.output_state import OutputState
 
@@ -15,8 +16,10 @@ __all__ = [
     "Interrupted",
     "NotSafe",
     "Note",
+    "Remedy",
     "SafetyStop",
     "hints_of",
+    "noted",
 ]
 
 
@@ -47,11 +50,27 @@ class Note(str, Hints):
         return note
 
 
+@dataclass(frozen=True)
+class Remedy:
+    """Command of the program that solves an error, with the values of its options.
+
+    ``command`` is its name with its arguments. ``values`` are pairs of an option and its value,
+    True for an option without one. ``holes`` stand in the values for what only a person knows;
+    ``is_guess`` says that a person must check the values first.
+    """
+
+    command: tuple[str, ...]
+    values: tuple[tuple[str, str | float], ...] = ()
+    holes: tuple[str, ...] = ()
+    is_guess: bool = False
+
+
 class DearigError(Exception, Hints):
     """An error whose text tells the operator what happened, where, and what to do.
 
     The text names no option of a command and no field of the window: ``option``, a name or
-    several, and ``command`` say what each face adds to it (``Hints``).
+    several, and ``command`` say what each face adds to it (``Hints``). ``remedy`` is a whole
+    command that solves it, None without one.
 
     ``output_state`` is what is known of the rig's output where the error ended a run, and None
     where no rig was contacted.
@@ -61,11 +80,16 @@ class DearigError(Exception, Hints):
     output_state: OutputState | None = None
 
     def __init__(
-        self, *text: object, option: str | Iterable[str] = (), command: Sequence[str] = ()
+        self,
+        *text: object,
+        option: str | Iterable[str] = (),
+        command: Sequence[str] = (),
+        remedy: Remedy | None = None,
     ) -> None:
         super().__init__(*text)
         self.options = (option,) if isinstance(option, str) else tuple(option)
         self.command = tuple(command)
+        self.remedy = remedy
 
     @property
     def needs_inspection(self) -> bool:
@@ -125,3 +149,10 @@ def hints_of(text: str | BaseException) -> list[Hints]:
             found.append(cause)
         cause = cause.__cause__ if isinstance(cause, DearigError) else None
     return found
+
+
+def noted(error: DearigError) -> Note:
+    """Return what ``error`` says with all its hints, as a text that goes to another process."""
+    hints = hints_of(error)
+    options = dict.fromkeys(option for hint in hints for option in hint.options)
+    return Note(str(error), options, next((h.command for h in hints if h.command), ()))

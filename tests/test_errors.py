@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from dearig.errors import InputError, InstrumentFault, Note, hints_of
+from dearig.errors import InputError, InstrumentFault, Note, hints_of, noted
 
 ROOT = Path(__file__).parents[1]
 #: Where texts are worded for the person who reads them there.
-FACES = ("app/cli/", "app/window/", "app/api/", "app/recording/importers/", "app/command_line.py")
+FACES = ("app/cli/", "app/window/", "app/api/", "app/command_line.py")
 OPTION = re.compile(r"--[a-z]")
 
 
@@ -84,6 +84,14 @@ def test_hints_of_an_error_are_found_after_it_was_raised_again():
         ((), ("recover", "x.h5")),
         (("a", "b"), ()),
     ]
+
+
+def test_an_error_for_another_process_keeps_all_its_hints():
+    first = InputError("one", option=("a", "b"))
+    with pytest.raises(InstrumentFault) as second:
+        raise InstrumentFault("two", option="c", command=("recover", "x.h5")) from first
+    note = pickle.loads(pickle.dumps(noted(second.value)))  # noqa: S301  (made here)
+    assert (note, note.options, note.command) == ("two", ("c", "a", "b"), ("recover", "x.h5"))
 
 
 def test_a_text_without_hints_has_none():

@@ -136,7 +136,7 @@ def import_(
         _columns(column or []), gauge_length_mm, area_mm2,
         None if kinematics is None else kinematics.value, rate, names_line, skip_bad_rows,
         {} if settings is None else raw_scales(settings), table,
-        typed=_typed(
+        typed=_given(
             film_length_mm=film_length_mm, film_width_mm=film_width_mm,
             film_thickness_um=film_thickness_um, permittivity=permittivity, load_g=load_g,
             rig_file=rig_file, film=film or None, notes=notes or None, force=force or None,
@@ -158,11 +158,15 @@ def import_(
     )
     for took in done.took:
         print_line(console, f"  {took}")
-    for note in done.notes:
+    told = {
+        "took": list(done.took),
+        "notes": [with_hints(note) for note in done.notes],
+        "doubts": [with_hints(doubt) for doubt in done.doubts],
+    }
+    for note in told["notes"]:
         print_line(console, f"Note: {note}")
-    for doubt in done.doubts:
+    for doubt in told["doubts"]:
         print_line(console, f"Check this: {doubt}", style="yellow")
-    told = {"took": list(done.took), "notes": list(done.notes), "doubts": list(done.doubts)}
     write_result({**describe(recording), **told}, json)
 
 
@@ -176,15 +180,13 @@ def _rig_file(path: Path | None) -> tuple[RigFile | None, str]:
     return load_rig_file(path), read_text(path, "rig file")
 
 
-def _typed(**given: object) -> tuple[str, ...]:
-    """Return the options that were ``given`` as words of a command line."""
-    words: list[str] = []
-    for name, value in given.items():
-        if value is not None:
-            words.append(f"--{name.replace('_', '-')}")
-            if value is not True:
-                words.append(f"{value:g}" if isinstance(value, float) else str(value))
-    return tuple(words)
+def _given(**options: str | Path | float | None) -> tuple[tuple[str, str | float], ...]:
+    """Return the options that were given, with their values."""
+    return tuple(
+        (name, str(value) if isinstance(value, Path) else value)
+        for name, value in options.items()
+        if value is not None
+    )
 
 
 def _list_columns(source: Path, names_line: int | None, json: str | None) -> None:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dearig.errors import Hints, InputError, hints_of
+from dearig.errors import DearigError, Hints, InputError, Remedy, hints_of
 from dearig.printable import MESSAGE_MAX, printable
 
 if TYPE_CHECKING:
@@ -95,17 +95,34 @@ _SUFFIXES = {
 def with_hints(text: str | BaseException) -> str:
     """Return a text, or what an error says, with the options and commands that it is about."""
     hints = hints_of(text)
-    named = dict.fromkeys(name for hint in hints for name in _named(hint))
+    remedy = text.remedy if isinstance(text, DearigError) else None
+    shown = {option_name(name) for name, _ in remedy.values} if remedy else set()
+    named = dict.fromkeys(name for hint in hints for name in _named(hint) if name not in shown)
     suffixes = dict.fromkeys(
         _SUFFIXES[option] for hint in hints for option in hint.options if option in _SUFFIXES
     )
     brackets = f" ({', '.join(named)})" if named else ""
-    return f"{text}{brackets}{''.join(suffixes)}"
+    return f"{text}{brackets}{''.join(suffixes)}{_run(remedy) if remedy else ''}"
 
 
 def option_name(name: str) -> str:
     """Return the option for a value: ``--gauge-length-mm`` for ``gauge_length_mm``."""
     return f"--{name.replace('_', '-')}"
+
+
+def _run(remedy: Remedy) -> str:
+    """Return the end of a text: the command to run, and what must be done before."""
+    words = ["dearig", *remedy.command]
+    for name, value in remedy.values:
+        words.append(option_name(name))
+        if value is not True:
+            words.append(f"{value:g}" if isinstance(value, float) else str(value))
+    before = "; run"
+    if remedy.holes:
+        before = f". Put what is right for {' and '.join(remedy.holes)}, and run"
+    elif remedy.is_guess:
+        before = ". If this is right, or after correcting it, run"
+    return f"{before}: {shlex.join(words)}"
 
 
 def _named(hint: Hints) -> Iterator[str]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import ast
 import itertools
+from pathlib import Path
 
 import pytest
 from typer.main import get_command
 
 from dearig.cli.main import app
 from dearig.cli.output import option_name, with_hints
-from dearig.errors import InputError, Note
-from tests.test_errors import modules
+from dearig.errors import InputError, Note, Remedy
+from tests.test_errors import ROOT, modules
 from tests.tools.command import dearig
 
 
@@ -24,6 +25,24 @@ from tests.tools.command import dearig
         (InputError("is there", option="force"), "is there, or use --force"),
         (InputError("full", option=("out", "force")), "full (--out), or use --force"),
         (InputError("cut", command=("recover", "a b.h5")), "cut (dearig recover 'a b.h5')"),
+        (
+            InputError(
+                "no rate",
+                option=("rate_Hz", "column"),
+                remedy=Remedy(
+                    ("import", "a b.csv"), (("out", "o.h5"), ("rate_Hz", 2.5), ("force", True))
+                ),
+            ),
+            "no rate (--column); run: dearig import 'a b.csv' --out o.h5 --rate-Hz 2.5 --force",
+        ),
+        (
+            InputError("open", remedy=Remedy(("import", "a"), (("table", "T"),), holes=("T", "U"))),
+            "open. Put what is right for T and U, and run: dearig import a --table T",
+        ),
+        (
+            InputError("guess", remedy=Remedy(("import", "a"), is_guess=True)),
+            "guess. If this is right, or after correcting it, run: dearig import a",
+        ),
         (InputError("no", command=("queue", "d"), option="skip"), "no (dearig queue d --skip)"),
     ],
 )
@@ -38,14 +57,16 @@ def test_an_error_of_the_command_shows_them(tmp_path):
     assert answer.err.rstrip().endswith("import data of other programs (dearig import)")
 
 
-def hinted(keyword: str) -> set[str]:
-    """Texts that modules below the faces give as ``keyword`` of a call."""
+def hinted(keyword: str, folder: Path = ROOT) -> set[str]:
+    """Texts, or keys, that modules in ``folder`` below the faces give as ``keyword`` of a call."""
     return {
         constant.value
         for path in modules()
+        if path.is_relative_to(folder)
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.keyword) and node.arg == keyword
-        for constant in itertools.islice(ast.walk(node.value), 20)
+        for part in (node.value.keys if isinstance(node.value, ast.Dict) else [node.value])
+        for constant in itertools.islice(ast.walk(part), 20)
         if isinstance(constant, ast.Constant) and isinstance(constant.value, str)
     }
 
@@ -53,7 +74,7 @@ def hinted(keyword: str) -> set[str]:
 def test_every_option_of_a_hint_is_one_of_a_command():
     commands = get_command(app).commands.values()
     known = {option for command in commands for p in command.params for option in p.opts}
-    given = hinted("option")
+    given = hinted("option") | hinted("answers")
     assert {"rig_file", "resume"} <= given
     assert {option_name(name) for name in given} <= known
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from dearig.cli.output import with_hints
+from dearig.errors import InputError
 from dearig.recording import Recording, import_file, open_recording
 from dearig.recording.importers import Imported, ImportOptions
 from tests.tools.recordings import Clock
@@ -29,6 +34,15 @@ def taken(path: Path, **options: object) -> Recording:
     """Import a file, and return the recording."""
     imported(path, **options)
     return open_recording(path.parent / "out.h5")
+
+
+@contextmanager
+def refused(match: str) -> Iterator[pytest.ExceptionInfo[InputError]]:
+    """Expect an ``InputError`` whose text on the command line has ``match``, a pattern."""
+    with pytest.raises(InputError) as caught:
+        yield caught
+    shown = with_hints(caught.value)
+    assert re.search(match, shown), shown
 
 
 def octave_text(columns: Mapping[str, np.ndarray]) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from threading import Event as Flag
 
 from dearig.drivers.rig import Event
-from dearig.errors import InputError
+from dearig.errors import InputError, Note, hints_of
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.progress import Progress, part, quiet
 from dearig.recording.content.assumed import ASSUMED, FILM_VALUES, assumed_of
@@ -18,7 +18,12 @@ from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
 from dearig.recording.files import check_output, file_sha256
 from dearig.recording.importers.columns.choose import choose
-from dearig.recording.importers.columns.chosen import HOLE, UNIT_HOLE, Chosen, command_line
+from dearig.recording.importers.columns.chosen import (
+    HOLE,
+    UNIT_HOLE,
+    Chosen,
+    import_command,
+)
 from dearig.recording.importers.columns.plausible import doubts
 from dearig.recording.importers.columns.proposal import first_values
 from dearig.recording.importers.columns.specimen import Specimen
@@ -71,8 +76,8 @@ class ImportOptions:
         Scales of a rig file from volts at the card, by quantity.
     guess : bool
         Choose columns by their names too. Without it, ``columns`` are all.
-    typed : tuple of str
-        Further words of the command line, for commands in messages.
+    typed : tuple of (str, str or float)
+        Further options of the command with their values, for the command that an error proposes.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -85,7 +90,7 @@ class ImportOptions:
     raw: Mapping[str, Scale] = field(default_factory=dict)
     table: str | None = None
     guess: bool = True
-    typed: tuple[str, ...] = ()
+    typed: tuple[tuple[str, str | float], ...] = ()
 
     def __post_init__(self) -> None:
         if self.kinematics is not None and self.kinematics not in KINEMATICS:
@@ -143,8 +148,8 @@ def import_file(
     the file's name by default. ``progress`` gets the fraction of the whole import.
 
     Raises ``InputError``, with nothing written, for data that cannot be a recording, and where it
-    is not sure which column is which: then with the command that imports what seems right. An
-    interrupt leaves nothing behind.
+    is not sure which column is which: then its ``remedy`` is the command that imports what seems
+    right. An interrupt leaves nothing behind.
     """
     options = options or ImportOptions()
     path = Path(source)
@@ -152,11 +157,11 @@ def import_file(
     try:
         found = prepare(path, options, metadata=metadata, progress=part(progress, 0.0, WRITING))
     except UnsureError as error:
-        raise InputError(_question(error, path, out, options.columns, _typed(options))) from error
+        raise _question(error, path, out, options.columns, _typed(options)) from error
     except NeedsOptionError as error:
-        more = [*_typed(options), *error.words]
-        line = command_line(path, out, options.columns, options.table, more)
-        raise InputError(f"{error}; run: {line}") from error
+        more = [*_typed(options), *error.answers]
+        command = import_command(path, out, options.columns, options.table, more)
+        raise InputError(str(error), remedy=command) from error
     save_recording(
         out,
         found.values.kind,
@@ -237,21 +242,15 @@ def prepare(
     )
 
 
-def _typed(options: ImportOptions) -> list[str]:
-    """Return ``options`` as words of a command line."""
-    words = []
-    for name, value in (
-        ("--gauge-length-mm", options.gauge_length_mm),
-        ("--area-mm2", options.area_mm2),
-        ("--kinematics", options.kinematics),
-        ("--rate-Hz", options.rate_Hz),
-        ("--names-line", options.names_line),
-    ):
-        if value is not None:
-            words += [name, f"{value:g}" if isinstance(value, float) else str(value)]
-    if options.skip_bad_rows:
-        words.append("--skip-bad-rows")
-    return [*words, *options.typed]
+def _typed(options: ImportOptions) -> list[tuple[str, str | float]]:
+    """Return the ``options`` that are given, with their values."""
+    given = [
+        (name, value)
+        for name in ("gauge_length_mm", "area_mm2", "kinematics", "rate_Hz", "names_line")
+        if (value := getattr(options, name)) is not None
+    ]
+    skips = [("skip_bad_rows", True)] if options.skip_bad_rows else []
+    return [*given, *skips, *options.typed]
 
 
 def _provenance(
@@ -322,9 +321,12 @@ def _of_actuator(
             noted[ASSUMED] = ", ".join(names)
     if assumed := assumed_of(film, load, noted):
         values.notes.append(
-            f"fits of these data take {' and '.join(assumed)} of the thesis: give yours with "
-            f"--rig-file or the options of the film"
-        )
+            Note(
+                f"fits of these data take {' and '.join(assumed)} of the thesis: give yours",
+                option=("rig_file", "film_length_mm", "film_width_mm", "film_thickness_um",
+                        "permittivity", "kinematics", "load_g"),
+            )
+        )  # fmt: skip
     return film
 
 
@@ -335,8 +337,8 @@ def _events(values: Values, exported_before: tuple[Event, ...]) -> list[Event]:
     """
     last = values.columns["time"].size - 1
     found = [replace(event, sample=min(event.sample, last)) for event in exported_before]
-    found += [Event(0, "info", sentence) for sentence in values.notes]
-    found += [Event(0, "warning", sentence) for sentence in values.warnings]
+    found += [Event(0, "info", str(sentence)) for sentence in values.notes]
+    found += [Event(0, "warning", str(sentence)) for sentence in values.warnings]
     for sample, places in sorted(values.left.items())[:_EVENTS_MAX]:
         shown = ", ".join(places[:5]) + (f" and {len(places) - 5} more" if len(places) > 5 else "")
         found.append(Event(min(sample, last), "warning", f"left out before this sample: {shown}"))
@@ -352,34 +354,40 @@ class UnsureError(InputError):
     def __init__(self, chosen: Chosen) -> None:
         super().__init__(
             f"{chosen.source.path}: it is not sure what its columns are "
-            f"({'; '.join(chosen.unsure)})"
+            f"({'; '.join(chosen.unsure)})",
+            option=[o for why in chosen.unsure for hint in hints_of(why) for o in hint.options],
         )
         self.chosen = chosen
 
 
 def _question(
-    error: UnsureError, path: Path, out: Path, given: Mapping[str, str], more: Sequence[str]
-) -> str:
-    """Return the message for ``error``: what is not sure, first values, and a command to complete.
+    error: UnsureError,
+    path: Path,
+    out: Path,
+    given: Mapping[str, str],
+    more: Sequence[tuple[str, str | float]],
+) -> InputError:
+    """Return the error to show for ``error``: what is not sure, first values, and the command.
 
-    ``given`` are the columns that the user named, ``more`` further words of the command line.
+    ``given`` are the columns that the user named, ``more`` further options with their values.
     """
     chosen = error.chosen
     if chosen.table_choices:
-        line = command_line(path, out, given, _TABLE_HOLE, more)
-        return f"{error}. Put one of them for {_TABLE_HOLE}, and run: {line}"
+        command = import_command(path, out, given, _TABLE_HOLE, more)
+        return InputError(str(error), remedy=replace(command, holes=(_TABLE_HOLE,)))
     pairs = chosen.template
-    holes = [
+    holes = tuple(
         hole for hole, is_there in (
             (HOLE, HOLE in pairs.values()),
             (UNIT_HOLE, any(name.endswith(f"_{UNIT_HOLE}") for name in pairs)),
             (_FACTOR[1:], any(column.endswith(_FACTOR) for column in pairs.values())),
         ) if is_there
-    ]  # fmt: skip
-    line = command_line(path, out, pairs, chosen.table, more)
+    )  # fmt: skip
+    command = import_command(path, out, pairs, chosen.table, more)
     if not holes:
-        return f"{error}. If this is right, or after correcting it, run: {line}"
-    return (
-        f"{error}. The columns begin with {first_values(chosen)}. Put what is right for "
-        f"{' and '.join(holes)}, and run: {line}"
+        return InputError(str(error), remedy=replace(command, is_guess=True))
+    return InputError(
+        f"{path}: the columns begin with {first_values(chosen)}. It is not sure what they are "
+        f"({'; '.join(chosen.unsure)})",
+        remedy=replace(command, holes=holes),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, cast
 
@@ -48,12 +48,19 @@ PARSER_FAILURES = (
 class NeedsOptionError(InputError):
     """A file needs something that only the user knows, or agrees to.
 
-    ``words`` are those of the command line that give it, such as ``--skip-bad-rows``.
+    ``answers`` are the options that give it, with their values; True for one without a value. The
+    other options that help are in ``option``.
     """
 
-    def __init__(self, message: str, *words: str) -> None:
-        super().__init__(message)
-        self.words = words
+    def __init__(
+        self,
+        message: str,
+        *,
+        answers: Mapping[str, str | float] | None = None,
+        option: Iterable[str] = (),
+    ) -> None:
+        self.answers = tuple((answers or {}).items())
+        super().__init__(message, option=[*(name for name, _ in self.answers), *option])
 
 
 class GapError(InputError):
@@ -101,7 +108,7 @@ class Source(Protocol):
 
     @property
     def names(self) -> Sequence[str]:
-        """Names of all columns, as in ``--column NAME=SOURCE``."""
+        """Names of all columns."""
         ...
 
     def named(self, name: str) -> list[str]:
@@ -154,19 +161,23 @@ def listing(names: Sequence[str]) -> str:
     return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"
 
 
-def skip_or_refuse(said: str, lost: int, rows: int, more: str = "") -> InputError:
+def skip_or_refuse(
+    said: str, lost: int, rows: int, more: str = "", option: Sequence[str] = ()
+) -> InputError:
     """Return the error for ``lost`` of some ``rows`` that cannot be used, the first one ``said``.
 
     An option leaves single rows out; it is not proposed where it would leave out what matters.
+    ``more`` is said at the end, of further options.
     """
     if lost <= LOST_MAX * rows:
-        counted = f" ({lost} of {rows})" if lost > 1 else ""
+        counted = f"; {lost} of {rows} rows are so" if lost > 1 else ""
         return NeedsOptionError(
-            f"{said}; --skip-bad-rows leaves such rows out{counted}{more}", "--skip-bad-rows"
+            f"{said}{counted}{more}", answers={"skip_bad_rows": True}, option=option
         )
     return InputError(
         f"{said}; {lost} of {rows} rows are so, too many to leave out: correct the file, or export "
-        f"it again{more}"
+        f"it again{more}",
+        option=option,
     )
 
 

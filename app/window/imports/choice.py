@@ -7,21 +7,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from dearig.errors import DearigError, hints_of
 from dearig.recording.importers.listing import ColumnGuesses, ColumnPreview, Guessed
 from dearig.recording.importers.quantities.labels import DIMENSIONS, RAW, target_name
 from dearig.recording.importers.quantities.units import UNITS
 
 __all__ = [
     "AT_CARD",
+    "LABELS",
     "ColumnChoice",
     "columns_option",
     "first_choices",
-    "in_window_words",
     "kind_of",
     "problems",
     "quantity_label",
     "unit_label",
     "units_of",
+    "with_labels",
 ]
 
 #: Unit of an instrument's output in volts, which the rig file scales.
@@ -30,21 +32,24 @@ _UNIT_LABELS = MappingProxyType(
     {"us": "µs", "um": "µm", "uN": "µN", "uA": "µA", "C": "°C", "pct": "%", "1": "no unit (part)",
      AT_CARD: "V at the card"}
 )  # fmt: skip
-#: What the fields of the window are called where a message names an option of the command.
-_LABELS = MappingProxyType(
+#: What the window calls the options that a text of an import is about.
+LABELS = MappingProxyType(
     {
-        ", or replace it with --force": "",
-        "give it to the commands as it is": "copy it into the folder of recordings",
-        "--skip-bad-rows leaves such rows out": "“Leave out bad rows” leaves them out",
-        "--gauge-length-mm": "“Gauge length”",
-        "--area-mm2": "“Cross-section”",
-        "--rate-Hz": "“Rate”",
-        "--names-line": "“Names in line”",
-        "--table takes one": "one must be chosen",
-        "--rig-file or the options of the film": "“Film and load”",
-        "--rig-file": "“Film and load”",
+        "column": "“Quantity” and “Scale”",
+        "table": "“Table”",
+        "names_line": "“Names in line”",
+        "rate_Hz": "“Rate”",
+        "skip_bad_rows": "“Leave out bad rows”",
+        "gauge_length_mm": "“Gauge length”",
+        "area_mm2": "“Cross-section”",
+        "kinematics": "“Kinematics”",
     }
-)
+    | dict.fromkeys(
+        ("rig_file", "film_length_mm", "film_width_mm", "film_thickness_um", "permittivity",
+         "load_g"),
+        "“Film and load”",
+    )
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -169,15 +174,16 @@ def columns_option(
     return found
 
 
-def in_window_words(text: str, path: Path | None = None) -> str:
-    """Return a message of the import with the labels of the window for options of the command.
+def with_labels(text: str | DearigError, path: Path | None = None) -> str:
+    """Return a text of the import with the labels of the fields that it is about.
 
     The file at ``path``, which is shown already, is not named again.
     """
+    shown = str(text)
     if path is not None:
-        text = text.replace(f"{path}, ", "").replace(f"{path}: ", "")
-        text = text.replace(f"{path} ", "the file ")
-        text = text[:1].upper() + text[1:]
-    for option, words in _LABELS.items():
-        text = text.replace(option, words)
-    return text
+        shown = shown.replace(f"{path}, ", "").replace(f"{path}: ", "")
+        shown = shown.replace(f"{path} ", "the file ")
+        shown = shown[:1].upper() + shown[1:]
+    options = (option for hint in hints_of(text) for option in hint.options)
+    labels = dict.fromkeys(LABELS[option] for option in options if option in LABELS)
+    return f"{shown} ({', '.join(labels)})" if labels else shown

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 
 from dearig.analysis.import_preview import ImportTrial, preview_file, try_import, write_import
 from dearig.config.imports import raw_scales
-from dearig.errors import InputError
+from dearig.errors import InputError, noted
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.files import check_output
 from dearig.recording.importers import Imported, ImportOptions
@@ -31,9 +31,9 @@ from dearig.window.imports.choice import (
     ColumnChoice,
     columns_option,
     first_choices,
-    in_window_words,
     kind_of,
     problems,
+    with_labels,
 )
 from dearig.window.imports.memory import ImportMemory, Remembered
 from dearig.window.imports.options import ImportFields
@@ -335,7 +335,7 @@ class ImportDialog(QDialog):
         try:
             options, metadata = self.options()
         except InputError as error:
-            self._show_trial(None, str(error))
+            self._show_trial(None, noted(error))
             return
         self.said.show_text("")
         self._submit(
@@ -352,12 +352,12 @@ class ImportDialog(QDialog):
     def _show_trial(self, trial: ImportTrial | None, trouble: str = "") -> None:
         self.plot.show_trial(trial)
         if trial is None:
-            self.said.show_text(in_window_words(trouble, self.path))
+            self.said.show_text(with_labels(trouble, self.path))
         else:
             lines = [f"{trial.samples} samples, {trial.duration:.4g} s of {trial.kind} data", ""]
             lines += [f"• {took}" for took in trial.said.took]
-            lines += [f"• {in_window_words(note)}" for note in trial.said.notes]
-            lines += [f"Check: {in_window_words(doubt)}" for doubt in trial.said.doubts]
+            lines += [f"• {with_labels(note)}" for note in trial.said.notes]
+            lines += [f"Check: {with_labels(doubt)}" for doubt in trial.said.doubts]
             self.said.show_text("\n".join(lines), "warn" if trial.said.doubts else "")
         self._show_state()
 
@@ -370,7 +370,9 @@ class ImportDialog(QDialog):
         self._drop()
         job = self._worker.submit(function, *given, whole=True)
         job.finished.connect(lambda found: self._after(job, lambda: then(found)))
-        job.failed.connect(lambda sentence: self._after(job, lambda: self._failed(sentence)))
+        job.failed.connect(
+            lambda sentence: self._after(job, lambda: self._failed(job.failure or sentence))
+        )
         job.cancelled.connect(lambda: self._after(job, self._stopped))
         self.job.begin(job)
 
@@ -416,7 +418,7 @@ class ImportDialog(QDialog):
         try:
             out = self.out_path()
         except InputError as error:
-            self.to_do.show_text(in_window_words(str(error)))
+            self.to_do.show_text(with_labels(error))
             return
         self._submit(
             lambda said: self._take_import(out, said),
@@ -466,7 +468,7 @@ class ImportDialog(QDialog):
             try:
                 self.out_path()
             except InputError as error:
-                found = [in_window_words(str(error))]
+                found = [with_labels(error)]
         self.start.setEnabled(not found and self._tried is not None and not self._writing)
         for widget in (self.columns, self.fields, self.table_box, self.out):
             widget.setEnabled(self.content is not None and not self._writing)

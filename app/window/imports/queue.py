@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from dearig.recording.importers import IMPORTERS, Imported
 from dearig.window.documents.dialogs import choose_files, run_dialog
-from dearig.window.imports.choice import in_window_words
+from dearig.window.imports.choice import with_labels
 from dearig.window.imports.dialog import ImportDialog
 from dearig.window.jobs.worker import Worker
 from dearig.window.session.state import Session
@@ -76,5 +76,5 @@ class Imports(QObject):
     def _say(self, out: Path, said: Imported) -> None:
         text = f"Imported {out.name}: {'; '.join(said.took)}"
         if said.doubts:
-            text += f". Check: {'; '.join(map(in_window_words, said.doubts))}"
+            text += f". Check: {'; '.join(map(with_labels, said.doubts))}"
         self.said.emit(text, "warn" if said.doubts else "good")

@@ -67,6 +67,7 @@ class Job(QObject):
         self.request = request
         self.whole = whole
         self.asked_to_stop = False
+        self.failure = ""  #: why it failed: what ``failed`` carries, as a ``Note`` with its hints
 
     @Slot()
     def cancel(self) -> None:
@@ -251,4 +252,5 @@ class Worker(QObject):
         elif kind == "stopped":
             job.cancelled.emit()
         else:
-            job.failed.emit(value)
+            job.failure = value
+            job.failed.emit(str(value))

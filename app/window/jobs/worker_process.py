@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from dearig.errors import DearigError
+from dearig.errors import DearigError, noted
 
 __all__ = ["CURRENT", "Request", "StopRequest", "WorkerMessage", "broken", "serve"]
 
@@ -45,7 +45,7 @@ class WorkerMessage:
     """Message about the job ``number``.
 
     ``kind`` is progress (``value`` is a stage and its fraction), done (``value`` is the result),
-    refused (a sentence), broken (a sentence on an error in the program, and its traceback) or
+    refused (a ``Note``), broken (a sentence on an error in the program, and its traceback) or
     stopped.
     """
 
@@ -137,7 +137,7 @@ def _done(connection: Connection, request: Request, lost: threading.Event) -> Wo
     except KeyboardInterrupt:
         return WorkerMessage(request.number, "stopped", None)
     except DearigError as error:
-        return WorkerMessage(request.number, "refused", str(error))
+        return WorkerMessage(request.number, "refused", noted(error))
     except Exception as error:  # noqa: BLE001  (an error must reach the person who waits)
         return broken(request.number, error)
     return WorkerMessage(request.number, "done", value)

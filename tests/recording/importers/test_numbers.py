@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dearig.errors import InputError
 from dearig.recording import Recording, import_file, open_recording
 from dearig.recording.importers import Imported, ImportOptions
 from dearig.recording.importers.quantities.labels import label_of
 from dearig.recording.importers.quantities.text_numbers import Signs, signs_of
-from tests.tools.imports import MOVED, TIME, VOLTAGE, same
+from tests.tools.imports import MOVED, TIME, VOLTAGE, refused, same
 from tests.tools.recordings import Clock
 
 
@@ -127,7 +126,7 @@ def test_a_comma_that_nothing_explains_is_said(tmp_path: Path) -> None:
 def test_thousands_behind_the_sample_are_refused_not_taken_for_decimals(tmp_path: Path) -> None:
     rows = "\n".join(f"{i},5;{i * 2 if i < 500 else f'{i * 2:,}'.replace(',', '.')};{i},25"
                      for i in range(510))  # fmt: skip
-    with pytest.raises(InputError, match=r"line 502, column 'voltage_V': '1.000' is not a number"):
+    with refused(r"line 502, column 'voltage_V': '1.000' is not a number"):
         imported(tmp_path, f"time_s;voltage_V;displacement_mm\n{rows}\n")
 
 
@@ -148,10 +147,10 @@ def test_other_units_of_stress(tmp_path: Path, unit: str, pascal: float) -> None
 
 def test_a_unit_that_is_not_known_needs_a_scale(tmp_path: Path) -> None:
     text = table("Time (s),Voltage (V),Travel (px)", "{t:.2f},{v:.6f},{m:.9f}")
-    with pytest.raises(InputError, match=r"unit 'px' .* not known.*mm=Travel \(px\)\*FACTOR'"):
+    with refused(r"unit 'px' .* not known.*mm=Travel \(px\)\*FACTOR'"):
         imported(tmp_path, text)
     given = {"displacement_mm": "Travel (px)"}
-    with pytest.raises(InputError, match=r"in 'px' by its name.*or \*1 if it is in mm"):
+    with refused(r"in 'px' by its name.*or \*1 if it is in mm"):
         imported(tmp_path, text, columns=given)
     done, run = imported(tmp_path, text, columns={"displacement_mm": "Travel (px)*1"})
     same(run)
@@ -169,7 +168,7 @@ def test_an_optional_column_with_gaps_costs_no_rows(tmp_path: Path) -> None:
         assert run.temperature is None
         assert any("temperature was not imported" in n and "line 3" in n for n in done.notes)
     asked = {"temperature_C": "temperature_C"}
-    with pytest.raises(InputError, match="line 3, column 'temperature_C': there is no value"):
+    with refused("line 3, column 'temperature_C': there is no value"):
         imported(tmp_path, text, columns=asked)
     assert imported(tmp_path, text, columns=asked, skip_bad_rows=True)[1].samples == 7
 
@@ -178,7 +177,7 @@ def test_the_first_rows_count_even_if_they_cannot_be_read(tmp_path: Path) -> Non
     lines = table("time_s,voltage_V,displacement_mm", "{t:.2f},{v:.6f},{m:.9f}").splitlines()
     for number in (1, 2):
         lines[number] = lines[number].rpartition(",")[0] + ",OVER"
-    with pytest.raises(InputError, match="line 2, column 'displacement_mm': 'OVER' is not a num"):
+    with refused("line 2, column 'displacement_mm': 'OVER' is not a num"):
         imported(tmp_path, "\n".join(lines))
     done, run = imported(tmp_path, "\n".join(lines), skip_bad_rows=True)
     assert run.samples == TIME.size - 2
@@ -209,7 +208,7 @@ def test_names_between_blanks_stand_above_their_columns(tmp_path: Path, head: st
 
 def test_names_that_cannot_be_told_apart_are_not_guessed(tmp_path: Path) -> None:
     text = table("Time in s Voltage in V Travel in mm", "{t:.2f} {v:.6f} {m:.9f}")
-    with pytest.raises(InputError, match="the names #1, #2, #3 do not say what the columns are"):
+    with refused("the names #1, #2, #3 do not say what the columns are"):
         imported(tmp_path, text)
 
 
@@ -263,7 +262,7 @@ def test_an_order_of_day_and_month_that_a_late_row_tells(tmp_path: Path) -> None
 def test_an_order_of_day_and_month_that_nothing_tells_is_asked(tmp_path: Path) -> None:
     rows = [f"0{1 + i}/0{1 + i * 2}/2024 12:00:00,{i},{i}" for i in range(4)]
     text = "\n".join(["Timestamp,Voltage (V),Travel (mm)", *rows])
-    with pytest.raises(InputError, match=r"such as 01/01/2024, may have the day or .* --rate-Hz"):
+    with refused(r"such as 01/01/2024, may have the day or .* --rate-Hz"):
         imported(tmp_path, text)
 
 
@@ -288,11 +287,9 @@ def test_minutes_and_seconds_with_a_dot(
 
 
 def test_minutes_and_seconds_in_another_unit_are_asked(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"in s, but .* 41.00 follows 40.59.* --rate-Hz 1$"):
+    with refused(r"in s, but .* 41.00 follows 40.59.* --rate-Hz 1$"):
         imported(tmp_path, by_sixties(" (s)"))
-    with pytest.raises(
-        InputError, match=r"seem to be minutes and seconds.* --column time_UNIT=Time "
-    ):
+    with refused(r"seem to be minutes and seconds.* --column time_UNIT=Time "):
         imported(tmp_path, by_sixties(""))
 
 

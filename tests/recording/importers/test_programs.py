@@ -12,6 +12,7 @@ import pytest
 from nptdms import ChannelObject, TdmsWriter
 from openpyxl import Workbook
 
+from dearig.cli.output import with_hints
 from dearig.errors import InputError
 from dearig.recording import open_recording
 from tests.tools.imports import (
@@ -23,6 +24,7 @@ from tests.tools.imports import (
     VOLTAGE,
     imported,
     octave_text,
+    refused,
     same,
     taken,
 )
@@ -92,7 +94,7 @@ def test_a_comma_between_columns_and_before_decimals_is_refused(tmp_path: Path) 
     text = "Time (s),Voltage (V),Displacement (mm)\n"
     body = "\n".join(",".join(f"{v:.4f}".replace(".", ",") for v in row) for row in TABLE)
     (tmp_path / "in.csv").write_text(text + body, "utf-8")
-    with pytest.raises(InputError, match="3 names, and the rows below it have 6 numbers"):
+    with refused("3 names, and the rows below it have 6 numbers"):
         imported(tmp_path / "in.csv")
 
 
@@ -138,17 +140,17 @@ def test_a_point_with_two_meanings_is_refused(tmp_path: Path) -> None:
     stamps = [f"{5 * i}.000" if 5 * i < 1000 else f"{5 * i / 1e3:.3f}.000" for i in range(1600)]
     text += rows(stamps, [f"{v:.3f}" for v in RISE], [f"{v:.3f}" for v in RISE], separator=";")
     (tmp_path / "in.csv").write_text(text, "utf-8")
-    with pytest.raises(InputError, match=r"'0.000' and '1.000.000' .* cannot both be right"):
+    with refused(r"'0.000' and '1.000.000' .* cannot both be right"):
         imported(tmp_path / "in.csv")
 
 
 def test_universal_files_and_tables_of_qcodes_are_named(tmp_path: Path) -> None:
     (tmp_path / "in.uff").write_text("    -1\n    58\nVoltage\nNONE\n" + "0 1 2 3\n" * 9, "utf-8")
-    with pytest.raises(InputError, match=r"a universal file .* dataset 58"):
+    with refused(r"a universal file .* dataset 58"):
         imported(tmp_path / "in.uff")
     path = tmp_path / "qcodes_1_8eca82b0-0000-0000-0000-01a21f0fa9c5.csv"
     path.write_text(rows(plain(TIME), plain(1e3 * MOVED), plain(VOLTAGE), separator="\t"), "utf-8")
-    with pytest.raises(InputError, match=r"QCoDeS sorts .* import that one.* voltage_kV=COLUMN"):
+    with refused(r"QCoDeS sorts .* import that one.* voltage_kV=COLUMN"):
         imported(path)
 
 
@@ -180,7 +182,7 @@ def test_octaves_text(tmp_path: Path) -> None:
     (tmp_path / "in.mat").write_text(text, "utf-8")
     same(taken(tmp_path / "in.mat"))
     (tmp_path / "in.mat").write_text(octave_text(COLUMNS)[:900], "utf-8")
-    with pytest.raises(InputError, match="cannot be read as a text file of Octave"):
+    with refused("cannot be read as a text file of Octave"):
         imported(tmp_path / "in.mat")
 
 
@@ -237,7 +239,7 @@ def test_scales_and_fill_values_of_netcdf(tmp_path: Path) -> None:
         file["displacement"].attrs["_FillValue"] = np.float32(9.96921e36)
         for name, unit in (("time", "s"), ("voltage", "V"), ("displacement", "mm")):
             file[name].attrs["units"] = unit
-    with pytest.raises(InputError, match="row 51, column 'displacement'"):
+    with refused("row 51, column 'displacement'"):
         imported(path)
     run = taken(path, skip_bad_rows=True)
     kept = np.delete(np.arange(ROWS), 50)
@@ -253,10 +255,10 @@ def test_traces_are_called_as_their_dataset(tmp_path: Path) -> None:
             trace = np.zeros(ROWS, kind)
             trace["t"], trace["values"] = TIME, values
             file[f"traces/{name}"] = trace
-    with pytest.raises(InputError, match=r"displacement_mm=traces/laser_mm/values") as raised:
+    with refused(r"displacement_mm=traces/laser_mm/values") as raised:
         imported(path)
-    assert "voltage_V=traces/HV_monitor_V/values" in str(raised.value)
-    assert "time_UNIT=" in str(raised.value)
+    assert "voltage_V=traces/HV_monitor_V/values" in with_hints(raised.value)
+    assert "time_UNIT=" in with_hints(raised.value)
 
 
 def pandas_group(file: h5py.File, kind: str) -> h5py.Group:
@@ -325,7 +327,7 @@ def test_json_with_an_index_for_keys(tmp_path: Path, index: str) -> None:
     content = {n: dict(zip(keys, COLUMNS[n].tolist(), strict=True)) for n in names}
     (tmp_path / "in.json").write_text(json.dumps(content), "utf-8")
     if index == "time":
-        with pytest.raises(InputError, match="time_UNIT=index --column voltage_V=voltage_V"):
+        with refused("time_UNIT=index --column voltage_V=voltage_V"):
             imported(tmp_path / "in.json")
         same(taken(tmp_path / "in.json", columns={"time_s": "index"}))
     else:

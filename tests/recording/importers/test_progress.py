@@ -11,7 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from dearig.errors import InputError
+from dearig.cli.output import with_hints
+from dearig.errors import InputError, hints_of
 from dearig.recording import import_file, open_recording
 from dearig.recording.importers import ImportOptions
 from dearig.recording.importers.columns.specimen import Specimen
@@ -100,7 +101,7 @@ def test_columns_are_listed_in_one_reading(tmp_path: Path, monkeypatch: pytest.M
 
 
 def command_in(error: InputError) -> list[str]:
-    found = re.search(r"run: (dearig import .*)", str(error))
+    found = re.search(r"run: (dearig import .*)", with_hints(error))
     assert found is not None
     return shlex.split(found[1])
 
@@ -119,10 +120,11 @@ def test_sizes_of_the_specimen_are_asked_for_at_once_with_what_the_file_tells(
     tmp_path: Path,
 ) -> None:
     path, out = film(tmp_path), tmp_path / "out.h5"
-    with pytest.raises(InputError, match=r"gauge-length-mm.*area-mm2") as caught:
-        import_file(path, out, ImportOptions(typed=("--film", "a 1")))
+    with pytest.raises(InputError, match=r"no stretch.*and force") as caught:
+        import_file(path, out, ImportOptions(typed=(("film", "a 1"),)))
     words = command_in(caught.value)
     assert words[:5] == ["dearig", "import", str(path), "--out", str(out)]
+    assert set(hints_of(caught.value)[0].options) == {"gauge_length_mm", "area_mm2"}
     assert words[5:] == ["--film", "a 1", "--gauge-length-mm", "30", "--area-mm2", "18"]
     assert not out.exists()
 

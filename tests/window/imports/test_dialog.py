@@ -13,7 +13,7 @@ from PySide6.QtGui import QDropEvent
 from PySide6.QtWidgets import QComboBox, QDialog
 from pytestqt.qtbot import QtBot
 
-from dearig.errors import DearigError
+from dearig.errors import DearigError, noted
 from dearig.progress import quiet
 from dearig.recording import Recording, open_recording
 from dearig.window.imports import queue as imports
@@ -36,6 +36,7 @@ class Job(QObject):
     failed = Signal(str)
     cancelled = Signal()
     asked_to_stop = False
+    failure = ""
     whole = True
 
     def cancel(self) -> None:
@@ -65,6 +66,7 @@ class Here(QObject):
         try:
             found = function(*given, progress=quiet)
         except DearigError as error:
+            job.failure = pickle.loads(pickle.dumps(noted(error)))  # noqa: S301  (made here)
             job.failed.emit(str(error))
         else:
             pickle.dumps(found)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from dearig.errors import InputError
+from dearig.errors import InputError, hints_of
 from dearig.progress import Progress
 from dearig.window.jobs.worker import Job, TimeLeft, Worker
 
@@ -32,7 +32,7 @@ def doubled(number: int, progress: Progress) -> int:
 
 
 def refused(progress: Progress) -> None:
-    raise InputError("x.h5 is not there")
+    raise InputError("x.h5 is not there", option="rig_file", command=("recover", "x.h5"))
 
 
 def defective(progress: Progress) -> None:
@@ -117,10 +117,14 @@ def test_jobs_come_in_their_order_but_for_those_put_first(qtbot, worker):
 
 
 def test_a_refusal_is_a_sentence_and_the_next_job_runs(qtbot, worker):
-    seen = ended(worker.submit(refused))
+    job = worker.submit(refused)
+    seen = ended(job)
     after = ended(worker.submit(doubled, 1))
     qtbot.waitUntil(lambda: after != [], timeout=_PATIENCE)
     assert seen == [("failed", "x.h5 is not there")]
+    assert job.failure == "x.h5 is not there"
+    (hint,) = hints_of(job.failure)
+    assert (hint.options, hint.command) == (("rig_file",), ("recover", "x.h5"))
     assert after == [("done", 2)]
 
 

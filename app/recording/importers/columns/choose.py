@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from dearig.errors import InputError
+from dearig.errors import InputError, Note
 from dearig.recording.importers.columns.chosen import LIKELY, Chosen, Pick, label_in
 from dearig.recording.importers.columns.guess import LENGTHS, PULLS, Guess, use_monitor
 from dearig.recording.importers.quantities.labels import (
@@ -92,7 +92,9 @@ def choose(
     found = parts[name]
     if len(parts) > 1 and name != default:
         found.table_choices = tuple(parts)
-        found.unsure.append(f"there are several tables, and --table takes one: {listing([*parts])}")
+        found.unsure.append(
+            Note(f"there are several tables, and one is taken: {listing([*parts])}", option="table")
+        )
     elif len(tables) > 1:
         found.notes.append(f"of {len(tables)} tables, {name!r} was taken")
     return found
@@ -169,13 +171,14 @@ def _leave_other_sizes(chosen: Chosen, asked: set[str]) -> None:
 def _asked(
     source: Source, labels: Mapping[str, Label], raw: Mapping[str, Scale], target: Target, text: str
 ) -> Pick:
-    """Return the pick of ``--column target=text``. Raises ``InputError`` if it cannot be."""
+    """Return the pick of ``text`` for ``target``. Raises ``InputError`` if it cannot be."""
     column, own = _column(source, text)
     source.check(column)
     if target.raw and target.quantity not in raw:
         raise InputError(
-            f"{target.name} takes volts at the card: give their scaling with --rig-file, or as "
-            f"{target_name(target.quantity, LIKELY[DIMENSIONS[target.quantity]])}={column}*FACTOR"
+            f"{target.name} takes volts at the card: give their scaling with a rig file, or as "
+            f"{target_name(target.quantity, LIKELY[DIMENSIONS[target.quantity]])}={column}*FACTOR",
+            option="rig_file",
         )
     scale = raw[target.quantity] if target.raw else target.scale
     if own is not None:
@@ -194,7 +197,8 @@ def _asked(
         raise InputError(
             f"{source.path}: {column!r} is in {label.unit} by its name, and {target.name} asks for "
             f"{target.unit}; if it is the output of an instrument, give its scale, such as "
-            f"{shlex.quote(f'{target.name}={column}*4')}, or --rig-file"
+            f"{shlex.quote(f'{target.name}={column}*4')}, or a rig file",
+            option="rig_file",
         )
     if label.unit != target.unit:
         right = target.name if target.raw else target_name(target.quantity, label.unit)

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
+from dearig.errors import Remedy
 from dearig.recording.importers.quantities.labels import Label, Target, label_of
 from dearig.recording.importers.quantities.units import Scale
 from dearig.recording.importers.source import Source
 
-__all__ = ["HOLE", "LIKELY", "UNIT_HOLE", "Chosen", "Pick", "command_line", "label_in", "own_name"]
+__all__ = [
+    "HOLE",
+    "LIKELY",
+    "UNIT_HOLE",
+    "Chosen",
+    "Pick",
+    "import_command",
+    "label_in",
+    "own_name",
+]
 
 #: What stands in a printed command for a column, and for a unit, that only the user knows.
 HOLE, UNIT_HOLE = "COLUMN", "UNIT"
@@ -86,20 +95,26 @@ class Chosen:
 
     @property
     def pairs(self) -> dict[str, str]:
-        """Columns by target, as ``--column TARGET=COLUMN`` gives them."""
+        """Columns by target, with their scales."""
         return {pick.target.name: pick.column + pick.behind for pick in self.picked.values()}
 
 
-def command_line(
-    path: Path, out: Path, pairs: Mapping[str, str], table: str | None, more: Sequence[str] = ()
-) -> str:
-    """Return the command line that imports the columns ``pairs`` of the file at ``path``."""
-    words = ["dearig", "import", str(path), "--out", str(out)]
-    for target, column in pairs.items():
-        words += ["--column", f"{target}={column}"]
+def import_command(
+    path: Path,
+    out: Path,
+    pairs: Mapping[str, str],
+    table: str | None,
+    more: Sequence[tuple[str, str | float]] = (),
+) -> Remedy:
+    """Return the command that imports the columns ``pairs`` of the file at ``path``.
+
+    ``more`` are further options with their values.
+    """
+    values: list[tuple[str, str | float]] = [("out", str(out))]
+    values += [("column", f"{target}={column}") for target, column in pairs.items()]
     if table is not None:
-        words += ["--table", table]
-    return shlex.join([*words, *more])
+        values.append(("table", table))
+    return Remedy(("import", str(path)), (*values, *more))
 
 
 #: A name of several levels as pandas writes it: ('rig', 'voltage_kV').

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dearig.errors import InputError
+from dearig.errors import InputError, Note
 from dearig.recording.importers.columns.chosen import LIKELY, Chosen, Pick, own_name
 from dearig.recording.importers.columns.proposal import ColumnProposal, counts, is_even, values_in
 from dearig.recording.importers.quantities.clock_numbers import by_sixties, counts_days, epoch_unit
@@ -313,8 +313,12 @@ class Guess:
             return
         likely = target_name(quantity, _likely(quantity))
         self._chosen.unsure.append(
-            f"{column!r} is the output of an instrument in {label.unit}, up to {largest:.3g}: its "
-            f"scale is needed, in --rig-file or as {shlex.quote(f'{likely}={column}*FACTOR')}"
+            Note(
+                f"{column!r} is the output of an instrument in {label.unit}, up to {largest:.3g}: "
+                f"its scale is needed, from a rig file or as "
+                f"{shlex.quote(f'{likely}={column}*FACTOR')}",
+                option="rig_file",
+            )
         )
         self._propose_scaled(target_of(likely), column, several)
 

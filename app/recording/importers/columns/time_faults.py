@@ -64,15 +64,14 @@ def check_forward(time: np.ndarray, column: str, place: Callable[[int], str], pa
         rows, rate = shared
         raise NeedsOptionError(
             f"{said}: {rows:.3g} rows share each time stamp, so its clock is coarser than the "
-            f"rows, or its digits are rounded; the rows are even, and --rate-Hz gives them their "
+            f"rows, or its digits are rounded; the rows are even, and a rate gives them their "
             f"time",
-            "--rate-Hz",
-            rate,
+            answers={"rate_Hz": rate},
         )
     latest = np.maximum.accumulate(time)
     lost = int((time[1:] <= latest[:-1]).sum())
-    more = ", and --rate-Hz replaces the time of evenly spaced samples"
-    raise skip_or_refuse(said, lost, time.size, more)
+    more = "; a rate replaces the time of evenly spaced samples"
+    raise skip_or_refuse(said, lost, time.size, more, option=["rate_Hz"])
 
 
 def _shared(time: np.ndarray) -> tuple[float, str] | None:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dearig.errors import InputError
+from dearig.errors import InputError, Note
 from dearig.recording.importers.columns.chosen import Chosen, Pick
 from dearig.recording.importers.columns.guess import LENGTHS, PULLS
 from dearig.recording.importers.columns.markers import markers_in
@@ -157,24 +157,30 @@ def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[s
     length = next((q for q in LENGTHS if q in there), None)
     pull = next((q for q in PULLS if q in there), None)
     if length is None:
-        raise _no_column(chosen, "stretch", "or displacement with --gauge-length-mm")
+        raise _no_column(
+            chosen, "stretch", "or displacement with a gauge length", option="gauge_length_mm"
+        )
     if pull is None:
-        raise _no_column(chosen, "nominal_stress", "or force_N with --area-mm2")
-    missing, words = [], []
+        raise _no_column(
+            chosen, "nominal_stress", "or force_N with a cross-section", option="area_mm2"
+        )
+    missing, answers = [], {}
     if length == "displacement" and specimen.gauge_length_mm is None:
         missing.append(
-            f"displacement and no stretch; give the specimen's length at rest with "
-            f"--gauge-length-mm{_hint(chosen, 'length')}"
+            f"displacement and no stretch; give the specimen's length at rest"
+            f"{_hint(chosen, 'length')}"
         )
-        words += ["--gauge-length-mm", _typed(told.gauge_length_mm, "LENGTH")]
+        answers["gauge_length_mm"] = _typed(told.gauge_length_mm, "LENGTH")
     if pull == "force" and specimen.area_mm2 is None:
         missing.append(
-            f"force and no nominal stress; give the specimen's cross-section at rest with "
-            f"--area-mm2{_hint(chosen, 'width', 'thickness', 'section')}"
+            f"force and no nominal stress; give the specimen's cross-section at rest"
+            f"{_hint(chosen, 'width', 'thickness', 'section')}"
         )
-        words += ["--area-mm2", _typed(told.area_mm2, "AREA")]
+        answers["area_mm2"] = _typed(told.area_mm2, "AREA")
     if missing:
-        raise NeedsOptionError(f"{chosen.source.path} has {'; and '.join(missing)}", *words)
+        raise NeedsOptionError(
+            f"{chosen.source.path} has {'; and '.join(missing)}", answers=answers
+        )
     if length != "displacement" and specimen.gauge_length_mm is not None:
         values.warnings.append(f"the gauge length was not used: there is a column of {length}")
     if pull != "force" and specimen.area_mm2 is not None:
@@ -193,13 +199,16 @@ def _hint(chosen: Chosen, *words: str) -> str:
     return f"; the file says: {listing(said)}" if said else ""
 
 
-def _no_column(chosen: Chosen, quantity: str, otherwise: str = "") -> InputError:
+def _no_column(
+    chosen: Chosen, quantity: str, otherwise: str = "", option: str | tuple[str, ...] = ()
+) -> InputError:
     """Return the error for a quantity that no column has."""
     return InputError(
         f"{chosen.source.path} has no column for {quantity} "
         f"({names_of(quantity)}{', ' if otherwise else ''}{otherwise}); there are: "
         f"{listing(chosen.source.names)}"
-        f"{suggestion([quantity], chosen.source.names)}"
+        f"{suggestion([quantity], chosen.source.names)}",
+        option=option,
     )
 
 
@@ -288,17 +297,20 @@ def _counted_by_sixties(chosen: Chosen, pick: Pick, time: np.ndarray, values: Va
     plain = shlex.quote(f"{pick.target.name}={pick.column}*1")
     if part is not None:
         values.notes.append(
-            f"{pick.column!r} is read as {'minutes' if unit == 'min' else 'hours'} and {part}: "
-            f"{seen}, and its steps are even only so; --column {plain} reads plain numbers"
+            Note(
+                f"{pick.column!r} is read as {'minutes' if unit == 'min' else 'hours'} and {part}: "
+                f"{seen}, and its steps are even only so; {plain} reads plain numbers",
+                option="column",
+            )
         )
         return counted / 60.0
     step = float(np.median(np.diff(counted)))
     raise NeedsOptionError(
         f"{chosen.source.path}: {pick.column!r} is in {unit}, but its values seem to be minutes "
-        f"and seconds: {seen}, and its steps are even only so; give the rate, or --column {plain} "
-        f"if they are plain numbers",
-        "--rate-Hz",
-        f"{1.0 / step:.9g}",
+        f"and seconds: {seen}, and its steps are even only so; give the rate, or {plain} if they "
+        f"are plain numbers",
+        answers={"rate_Hz": f"{1.0 / step:.9g}"},
+        option=["column"],
     )
 
 
@@ -345,10 +357,13 @@ def _leave_out(
 ) -> None:
     pick = picked.pop(quantity)
     chosen.picked.pop(quantity, None)
+    wanted = shlex.quote(f"{pick.target.name}={pick.column}")
     values.notes.append(
-        f"the {quantity.replace('_', ' ')} was not imported: {pick.column!r} has gaps ({where}); "
-        f"it is with --column {shlex.quote(f'{pick.target.name}={pick.column}')} and "
-        f"--skip-bad-rows"
+        Note(
+            f"the {quantity.replace('_', ' ')} was not imported: {pick.column!r} has gaps "
+            f"({where}); it is if {wanted} is asked for and such rows are left out",
+            option=("column", "skip_bad_rows"),
+        )
     )
 
 
@@ -368,9 +383,8 @@ def _step(chosen: Chosen, columns: Sequence[str], rate_Hz: float | None) -> floa
         raise NeedsOptionError(
             f"{chosen.source.path} has no column for time ({names_of('time')}); there are: "
             f"{listing(chosen.source.names)}{suggestion(['time_s'], chosen.source.names)}; give "
-            f"--rate-Hz if the samples are evenly spaced",
-            "--rate-Hz",
-            "RATE",
+            f"the rate if the samples are evenly spaced",
+            answers={"rate_Hz": "RATE"},
         )
     return float(step)
 

@@ -71,9 +71,8 @@ def with_order(column: TextColumn, cells: Iterable[str]) -> TextColumn:
         first = day_first_of(cells)
     except OpenDatesError as error:
         raise NeedsOptionError(
-            f"column {column.name!r}: {error}, or give --rate-Hz if the samples are evenly spaced",
-            "--rate-Hz",
-            "RATE",
+            f"column {column.name!r}: {error}, or give the rate if the samples are evenly spaced",
+            answers={"rate_Hz": "RATE"},
         ) from error
     if first == column.day_first:
         return column

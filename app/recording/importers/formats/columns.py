@@ -57,7 +57,7 @@ class NamedColumns(Generic[C]):
 
     @property
     def names(self) -> list[str]:
-        """Names of all columns, as in ``--column NAME=SOURCE``."""
+        """Names of all columns."""
         return list(self._columns)
 
     @property

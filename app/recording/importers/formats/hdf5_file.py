@@ -137,7 +137,8 @@ class _Walk:
     def _check_foreign(self, group: h5py.Group) -> None:
         if FORMAT in _texts(group, "format"):
             raise InputError(
-                f"{self._path} is a recording already: give it to the commands as it is"
+                f"{self._path} is a recording already, which needs no import: use it as it is, or "
+                f"copy it into the folder of recordings"
             )
 
     def _in_dataset(

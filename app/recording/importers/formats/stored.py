@@ -132,7 +132,8 @@ class StoredColumns(NamedColumns[Stored]):
                 )
                 raise InputError(
                     f"{self.path}: the columns have different times: {different}; they are not "
-                    f"resampled here: give columns of one rate with --column"
+                    f"resampled here: give columns of one rate",
+                    option="column",
                 )
         if timed:
             return next(iter(timed.values())).step_s

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from dearig.recording.importers.source import PARSER_FAILURES, printable
 
 if TYPE_CHECKING:
     from nptdms import TdmsChannel, TdmsFile
+    from nptdms.timestamp import TdmsTimestamp, TimestampArray
 
 __all__ = ["IMPORTER", "TdmsChannels"]
 
@@ -57,22 +58,23 @@ class TdmsChannels(StoredColumns):
                 )
             channels = [channel for group in file.groups() for channel in group.channels()]
             starts = [s for c in channels if (s := _started(c)) is not None]
+            first = min(starts, key=lambda s: (s.seconds, s.second_fractions), default=None)
             for channel in islice(channels, CHANNELS_MAX):
                 if channel.dtype.kind not in "fiuM" or len(channel) == 0:
                     continue
                 name = printable(f"{channel.group_name}/{channel.name}")
-                columns[name] = self._stored(channel, min(starts, default=None))
+                columns[name] = self._stored(channel, first)
         if not columns:
             raise InputError(f"{path} holds no channels of numbers")
         super().__init__(path, "a TDMS file", columns, cut_short=_is_cut_short(path))
         self.doubts = _appended(path)
 
-    def _stored(self, channel: TdmsChannel, first: np.datetime64 | None) -> Stored:
+    def _stored(self, channel: TdmsChannel, first: TdmsTimestamp | None) -> Stored:
         told: Mapping[str, object] = channel.properties
         step = _number(told.get("wf_increment"))
         start, started = _number(told.get("wf_start_offset")), _started(channel)
         if started is not None and first is not None:
-            start += float((started - first) / np.timedelta64(1, "us")) / 1e6
+            start += _seconds(started, first)
         dates = channel.dtype.kind == "M"
         return Stored(
             _loader(self.path, channel.group_name, channel.name), len(channel), channel.name,
@@ -85,15 +87,27 @@ class TdmsChannels(StoredColumns):
 def _loader(path: Path, group: str, channel: str) -> Callable[[], np.ndarray]:
     def load() -> np.ndarray:
         with _opened(path) as file:
-            return np.asarray(file[group][channel][:])
+            values = file[group][channel][:]
+            if hasattr(values, "second_fractions"):
+                return np.asarray(_seconds(values, values[0]))
+            return np.asarray(values)
 
     return load
 
 
-def _started(channel: TdmsChannel) -> np.datetime64 | None:
+def _started(channel: TdmsChannel) -> TdmsTimestamp | None:
     """Return the date and time of the first sample of a waveform, or None."""
     start = channel.properties.get("wf_start_time")
-    return start if isinstance(start, np.datetime64) and not np.isnat(start) else None
+    return start if hasattr(start, "second_fractions") else None
+
+
+def _seconds(stamps: TdmsTimestamp | TimestampArray, first: TdmsTimestamp) -> Any:
+    """Return the time in s since ``first`` of one time stamp or an array of them.
+
+    npTDMS cuts its own dates off below a microsecond, so that some are a microsecond early.
+    """
+    fractions = np.asarray(stamps.second_fractions, np.float64) - float(first.second_fractions)
+    return np.asarray(stamps.seconds) - np.int64(first.seconds) + fractions * 2.0**-64
 
 
 def _number(value: object) -> float:
@@ -112,7 +126,7 @@ def _opened(path: Path) -> Iterator[TdmsFile]:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                with TdmsFile.open(stream) as file:
+                with TdmsFile.open(stream, raw_timestamps=True) as file:
                     yield file
         except PARSER_FAILURES as error:
             raise InputError(f"{path} cannot be read as a TDMS file: {one_line(error)}") from error

@@ -199,8 +199,9 @@ def _no_table(lines: Sequence[str], start: int, path: Path) -> InputError:
     if len(data) == 1:
         return InputError(f"{path} has a line of names and no data")
     return InputError(
-        f"{path}: no two lines in a row are numbers; name the line of names with --names-line, and "
-        f"see that it is the right file"
+        f"{path}: no two lines in a row are numbers; name the line of names, and see that it is "
+        f"the right file",
+        option="names_line",
     )
 
 
