@@ -7,6 +7,7 @@ as it is printed: what it imports has to be right too.
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import shutil
@@ -68,8 +69,10 @@ def write_files(program: Program, folder: Path) -> str:
         install = [python, "-m", "pip", "install", "--quiet", *program.packages]
         if subprocess.run(install, check=False, capture_output=True).returncode:
             return "cannot be installed"
-        done = subprocess.run([python, "script"], cwd=folder, check=False, capture_output=True,
-                              text=True)  # fmt: skip
+        # some programs keep settings in the home folder
+        home = os.environ | {"HOME": made, "USERPROFILE": made}
+        done = subprocess.run([python, "script"], cwd=folder, env=home, check=False,
+                              capture_output=True, text=True)  # fmt: skip
         if done.returncode:
             print(done.stderr, file=sys.stderr)
     return program.packages[0].partition("==")[2]

@@ -97,6 +97,105 @@ signal = create_signal("Displacement", run["time_s"], run["displacement_mm"],
 write_signal("displacement.h5sig", signal)
 write_signal("displacement.csv", signal)
 """
+_PYMEASURE = """
+import numpy as np
+from pymeasure.experiment import FloatParameter, Procedure, Results, Worker
+run = dict(np.load("run.npz"))
+class Lobes(Procedure):
+    peak = FloatParameter("Peak voltage", units="kV", default=4.0)
+    DATA_COLUMNS = ["Time (s)", "Voltage (kV)", "Displacement (mm)"]
+    def execute(self):
+        for row in zip(*(run[n].tolist() for n in ("time_s", "voltage_kV", "displacement_mm"))):
+            self.emit("results", dict(zip(self.DATA_COLUMNS, row)))
+worker = Worker(Results(Lobes(), "run.csv"))
+worker.start()
+worker.join(timeout=120)
+"""
+_QCODES = """
+from pathlib import Path
+import numpy as np
+from qcodes.dataset import (
+    Measurement, initialise_or_create_database_at, load_or_create_experiment,
+)
+run = dict(np.load("run.npz"))
+made = Path("made")
+made.mkdir()
+initialise_or_create_database_at(str(made / "runs.db"))
+load_or_create_experiment("film", "sample")
+measurement = Measurement()
+measurement.register_custom_parameter("time", unit="s")
+for name, unit in (("voltage", "kV"), ("displacement", "mm")):
+    measurement.register_custom_parameter(name, unit=unit, setpoints=("time",))
+with measurement.run(write_in_background=False) as saver:
+    for t, v, m in zip(run["time_s"], run["voltage_kV"], run["displacement_mm"]):
+        saver.add_result(("time", t), ("voltage", v), ("displacement", m))
+for kind in ("csv", "netcdf"):
+    saver.dataset.export(kind, path=".")
+"""
+_PYMODAQ = """
+from pathlib import Path
+import numpy as np
+from pymodaq_data.data import Axis, DataRaw
+from pymodaq_data.h5modules.data_saving import DataSaverLoader
+from pymodaq_data.h5modules.saving import H5SaverLowLevel
+run = dict(np.load("run.npz"))
+for backend in ("h5py", "tables"):
+    saver = H5SaverLowLevel(backend=backend)
+    saver.init_file(file_name=Path(backend + ".h5"), new_file=True)
+    group = saver.get_set_group("/RawData", "run")
+    for name, unit in (("voltage", "kV"), ("displacement", "mm")):
+        axis = Axis("time", units="s", data=run["time_s"], index=0)
+        data = DataRaw(name, units=unit, data=[run[name + "_" + unit]], labels=[name], axes=[axis])
+        DataSaverLoader(saver).add_data(group, data)
+    saver.close_file()
+"""
+_ASAMMDF = """
+import numpy as np
+from asammdf import MDF, Signal
+run = dict(np.load("run.npz"))
+names = [n for n in run if n != "time_s"]
+with MDF(version="4.10") as file:
+    file.append([
+        Signal(run[n], run["time_s"], name=n.partition("_")[0], unit=n.partition("_")[2])
+        for n in names
+    ])
+    file.save("run.mf4")
+    file.export("csv", "run.csv")
+    file.export("csv", "units.csv", add_units=True)
+    file.export("mat", "run.mat")
+    file.export("hdf5", "run.h5")
+"""
+_BLUESKY = """
+import time
+import numpy as np
+from bluesky import RunEngine
+from bluesky.plan_stubs import close_run, create, open_run, read, save
+from suitcase.csv import Serializer
+run = dict(np.load("run.npz"))
+class Channel:
+    parent = None
+    def __init__(self, name, unit, values):
+        self.name, self.unit, self.values = name, unit, iter(values)
+    def read(self):
+        return {self.name: {"value": next(self.values), "timestamp": time.time()}}
+    def describe(self):
+        return {self.name: {"source": "run", "dtype": "number", "shape": [], "units": self.unit}}
+    def read_configuration(self):
+        return {}
+    describe_configuration = read_configuration
+def plan(channels):
+    yield from open_run()
+    for _ in run["time_s"]:
+        yield from create("primary")
+        for channel in channels:
+            yield from read(channel)
+        yield from save()
+    yield from close_run()
+named = [(n, n.partition("_")[2], v.tolist()) for n, v in run.items()]
+plain = [(n.partition("_")[0], unit, values) for n, unit, values in named]
+for prefix, channels in (("named-", named), ("plain-", plain)):
+    RunEngine()(plan([Channel(*c) for c in channels]), Serializer(".", file_prefix=prefix))
+"""
 _OCTAVE = """
 run = load("-text", "run.txt");
 time_s = run.time_s; voltage_kV = run.voltage_kV; displacement_mm = run.displacement_mm;
@@ -114,5 +213,16 @@ PROGRAMS = (
     Program("npTDMS", _NPTDMS, ("npTDMS==1.13.0", "numpy==2.4.6")),
     Program("mat-io", _MATIO, ("mat-io==1.0.2", "numpy==2.4.6")),
     Program("Sigima", _SIGIMA, ("sigima==1.0.5",)),
+    Program("PyMeasure", _PYMEASURE, ("PyMeasure==0.16.0", "numpy==2.4.6")),
+    Program("QCoDeS", _QCODES, ("qcodes==0.58.0",)),
+    Program(
+        "PyMoDAQ",
+        _PYMODAQ,
+        ("pymodaq_data==5.3.0", "h5py==3.16.0", "tables==3.11.1", "numpy==2.4.6"),
+    ),
+    Program(
+        "asammdf", _ASAMMDF, ("asammdf==8.8.28", "scipy==1.17.1", "h5py==3.16.0", "numpy==2.4.6")
+    ),
+    Program("suitcase-csv", _BLUESKY, ("suitcase-csv==0.3.0", "bluesky==1.15.1", "numpy==2.4.6")),
     Program("Octave", _OCTAVE, command=("octave-cli", "--norc")),
 )
