@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dearig.errors import InputError
 from dearig.formulas import as_text
-from dearig.model.effects import EFFECTS, ORIGINS, Effect
 from dearig.model.effects.description import COMMON_SYMBOLS
 from dearig.report.text.numbers import significant
 from dearig.report.text.tables import Row, Table
+
+if TYPE_CHECKING:
+    # the effects are searched, and the compiler loaded, where one is asked for
+    from dearig.model.effects import Effect
 
 __all__ = [
     "bounds_table",
@@ -32,6 +35,8 @@ def effect_named(name: str) -> Effect:
         If no effect has this name. The message has names that are like it.
     """
     import difflib
+
+    from dearig.model.effects import EFFECTS
 
     wanted = name.replace("_", " ").replace("-", " ").strip().lower()
     known = {n.replace("-", " ").lower(): n for n in EFFECTS}
@@ -57,6 +62,13 @@ def other_symbols(effect: Effect) -> tuple[tuple[str, str], ...]:
     return (*law.where, *shared)
 
 
+def _origin(effect: Effect) -> str:
+    """Return the distribution that an effect is from."""
+    from dearig.model.effects import ORIGINS
+
+    return ORIGINS[effect.name]
+
+
 def _occurs(symbol: str, text: str) -> bool:
     """Whether ``symbol`` stands in ``text`` as itself, not as the beginning of another one."""
     upright = re.sub(r"\\(?:mathrm|operatorname)\{[^}]*\}", " ", text)
@@ -78,7 +90,7 @@ def law_lines(effect: Effect) -> Iterator[str]:
     """Yield the equations of an effect, the meaning of its symbols and its source, as lines."""
     law = effect.law
     if law is None:
-        yield f"{ORIGINS[effect.name]} gives no equation of {effect.name}."
+        yield f"{_origin(effect)} gives no equation of {effect.name}."
         return
     yield f"Equations of {effect.name}:"
     for equation in law.equations:
@@ -110,7 +122,7 @@ def law_json(effect: Effect) -> dict[str, Any]:
         "family": effect.family,
         "acts_on": effect.acts_on,
         "summary": effect.summary,
-        "origin": ORIGINS[effect.name],
+        "origin": _origin(effect),
         "equations": list(law.equations) if law else [],
         "source": law.source if law else "",
         "parameters": [

@@ -45,7 +45,7 @@ EVIL = (
 FOREIGN = """
 (() => {
   const foreign = "script,img,iframe,object,embed,base,link,form,input,button,video,audio," +
-    "foreignObject,math,template,#evil,meta[http-equiv=refresh]";
+    "foreignObject,math:not(.law math),template,#evil,meta[http-equiv=refresh]";
   const odd = [...document.querySelectorAll(foreign)].map(e => e.outerHTML);
   for (const e of document.querySelectorAll("*"))
     for (const a of e.attributes) {
