@@ -166,6 +166,11 @@ def check_table(outcome: CheckOutcome) -> RenderableType:
     return Group(*pieces, Text(f"{outcome.rig}: {outcome.summary}."))
 
 
+def _plain(finding: Finding) -> dict[str, Any]:
+    """Return a finding as it is printed, without the reading that the window takes from it."""
+    return {name: value for name, value in asdict(finding).items() if name != "reading"}
+
+
 def check_json(outcome: CheckOutcome) -> dict[str, Any]:
     """Return the outcome for a JSON file."""
     return {
@@ -174,5 +179,5 @@ def check_json(outcome: CheckOutcome) -> dict[str, Any]:
         "simulated": outcome.simulated,
         "ok": not outcome.wrong,
         "well": not outcome.wrong,  # as "ok": the name in earlier versions
-        "findings": [asdict(finding) for finding in outcome.findings],
+        "findings": [_plain(finding) for finding in outcome.findings],
     }

@@ -31,12 +31,13 @@ def announce_rig(
 ) -> None:
     """Print the scaling and the limits of a run on a ``rig`` that is not simulated.
 
-    ``differing`` are sentences on what differs from them elsewhere, such as in a recording.
+    ``differing`` are sentences on what differs from them elsewhere, such as in a recording. Raises
+    ``InputError`` for a rig that is not known.
     """
     from dearig.acquisition.rig_source import in_force
-    from dearig.acquisition.rigs import is_simulated
+    from dearig.acquisition.rigs import kind_of
 
-    if is_simulated(rig):
+    if kind_of(rig).simulated:
         return
     print_line(console, in_force(settings, source))
     for sentence in differing:

@@ -81,7 +81,11 @@ def diagnose(
         if held:
             found, search = other, again
     progress("final fits", _LAST)
-    diagnosis = conclude(found, search.fitter, search.without, held, stop)
+
+    def ended() -> bool:
+        return found.status == "stopped" or stop()
+
+    diagnosis = conclude(found, search.fitter, search.without, held, ended)
     progress("final fits", 1.0)
     return diagnosis
 

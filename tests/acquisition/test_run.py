@@ -225,7 +225,7 @@ def test_a_standard_error_without_a_reader_counts_as_a_closed_terminal(
         def write(self, text: str) -> int:  # noqa: ARG002
             raise BrokenPipeError(32, "Broken pipe")
 
-    stream = LastingStream(Broken())
+    stream = LastingStream(Broken(), ends_run=True)
     rig = Troubled("read", lambda: print("a warning", file=stream))  # type: ignore[call-overload]
     monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
     with pytest.raises(Interrupted, match="because the terminal was closed: the voltage was ramp"):
@@ -234,7 +234,7 @@ def test_a_standard_error_without_a_reader_counts_as_a_closed_terminal(
     assert closed_at_zero(rig)
     # under nohup a run goes on
     monkeypatch.setattr("dearig.acquisition.interrupts.signal.getsignal", lambda _: signal.SIG_IGN)
-    stream = LastingStream(Broken())
+    stream = LastingStream(Broken(), ends_run=True)
     rig = Troubled("read", lambda: print("a warning", file=stream))  # type: ignore[call-overload]
     assert record(LOADED, "sim", RIG_FILE, tmp_path / "on.h5").outcome == "finished"
 

@@ -21,12 +21,12 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ("options", "words"),
     [
         (("--host", "0.0.0.0"), "--anywhere"),  # noqa: S104
-        (EVERYWHERE, "needs --tls-cert, --tls-key and --tls-client-ca"),
-        (("--host", "rig-server.example", "--anywhere"), "needs --tls-cert"),
+        (EVERYWHERE, "needs a certificate, its key and the CA of the clients"),
+        (("--host", "rig-server.example", "--anywhere"), "needs a certificate"),
         (("--tls-cert", "a.pem"), "belong together"),
         (("--tls-key", "a.key"), "belong together"),
-        (("--tls-client-ca", "a.pem"), "needs --tls-cert and --tls-key"),
-        (("--tls-cert", "a.pem", "--tls-key", "a.key"), "--tls-cert = a.pem cannot be read"),
+        (("--tls-client-ca", "a.pem"), "needs the server's own certificate and key"),
+        (("--tls-cert", "a.pem", "--tls-key", "a.key"), "certificate = a.pem cannot be read"),
     ],
 )
 def test_what_others_can_reach_needs_certificates_of_both_sides(

@@ -217,7 +217,7 @@ def test_an_interrupted_study_says_what_is_kept(
 def test_the_command_from_recordings_to_its_table(shelf: Path, tmp_path: Path) -> None:
     out = tmp_path / "study"
     arguments = ["study", shelf / "recordings", "--do", "validate", "--out", out]
-    refused(dearig(*arguments), "--do validate needs --model")
+    refused(dearig(*arguments), "a validation needs a model file (--model")
     model = ["--model", shelf / "model.toml"]
     refused(dearig("study", tmp_path, "--do", "identify"), "there is no recording")
     refused(dearig("study", tmp_path / "no", "--do", "identify"), "is not there")

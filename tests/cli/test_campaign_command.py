@@ -77,7 +77,10 @@ def test_wrong_input_is_refused_and_nothing_is_made(given, tmp_path: Path) -> No
     before = names(tmp_path)
     refused(dearig("campaign", *given, "--resume"), "has no campaign to continue")
     refused(dearig("campaign", *given, "--rig", "foo"), "'foo' is not known")
-    refused(dearig("campaign", *given, "--rig", "daqmx:Dev1"), "--operator", "--runs", "--hours")
+    # what applies on a real rig is said before it is armed
+    answer = dearig("campaign", *given, "--rig", "daqmx:Dev1")
+    assert (answer.code, "kV" in answer.out) == (2, True)
+    assert all(option in answer.err for option in ("--operator", "--runs", "--hours"))
     refused(dearig("campaign", *given, "--fault", "x"), "fault")
     refused(dearig("campaign-queue", tmp_path), "has no campaign")
     refused(dearig("campaign-queue", tmp_path, "--pause", "--continue"), "exclude each other")
