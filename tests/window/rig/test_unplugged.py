@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import RigFile
@@ -82,5 +83,5 @@ def test_a_rig_that_is_unplugged_in_mid_run(qtbot: QtBot, run_page: RunPage, fau
     assert "by hand" in run_page.badge.toolTip()
     # and it is not known any better because somebody armed and thought again
     for _ in range(2):
-        press(qtbot, run_page.arm_button)
+        qtbot.mouseClick(run_page.arm_button, Qt.MouseButton.LeftButton)
     assert run_page.runner.state is HighVoltage.UNKNOWN
