@@ -495,7 +495,9 @@ def step_table(outcome: DiagnoseOutcome) -> Table:
             Row(
                 (
                     name,
-                    significant(pooled_rms(stand.train) * shown.error_factor),
+                    NO_VALUE
+                    if not stand.train
+                    else significant(pooled_rms(stand.train) * shown.error_factor),
                     significant(stage.selection_rms * shown.error_factor),
                     NO_VALUE if errors is None else significant(errors.rms * shown.error_factor),
                     NO_VALUE if errors is None else significant(errors.rms / noise),

@@ -64,6 +64,10 @@ _QCODES = (
 )
 _HEAD = 4 * HEAD_CHARACTERS  # bytes: a character has four at most
 
+#: Wrong rows after which the rest of a file is not looked at, if there were more wrong than right
+#: ones until then: a second's work.
+_LOST_MAX = 20_000
+
 
 class TextFile(NamedColumns[TextColumn]):
     """The text file at ``path``. Raises ``InputError`` if it holds no table of numbers.
@@ -124,7 +128,7 @@ class TextFile(NamedColumns[TextColumn]):
         self._pointed: set[int] = set()
         self._decided: set[str] = set()  # columns whose signs the whole file has decided
         self._said: list[str] = []
-        self._leaves_out, self._grouped = skip_bad_rows, False
+        self._leaves_out, self._counts, self._grouped = skip_bad_rows, False, False
         self._section = Section("", self.layout.first, None)  # and the table that they are of
         #: rows before each row that was left out, and its line, in words
         self.skipped: list[tuple[int, str]] = []
@@ -193,7 +197,10 @@ class TextFile(NamedColumns[TextColumn]):
                 if wrong.column in self.optional:
                     raise GapError(wrong.place, wrong.column) from wrong
                 needed = [c for c in wanted if c.name not in self.optional]
-                rows = self._read_rows(needed, skip=True).rows
+                try:
+                    rows = self._read_rows(needed, skip=True, counts=True).rows
+                except _HopelessError:
+                    rows = 0
                 lost = len(self.skipped)
                 raise skip_or_refuse(f"{self.path}, {wrong.place}", lost, rows + lost) from wrong
             pointed = [c.name for c in wanted if c.place in self._pointed]
@@ -201,10 +208,14 @@ class TextFile(NamedColumns[TextColumn]):
                 break
         return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
 
-    def _read_rows(self, wanted: list[TextColumn], skip: bool) -> _Table:
-        """Return the rows of the columns ``wanted``; leave wrong ones out if ``skip``."""
+    def _read_rows(self, wanted: list[TextColumn], skip: bool, counts: bool = False) -> _Table:
+        """Return the rows of the columns ``wanted``; leave wrong ones out if ``skip``.
+
+        With ``counts`` it is only asked how many are wrong: raises ``_HopelessError`` once most
+        are.
+        """
         self.skipped, self._spans, self._wanted, self._pointed = [], [], wanted, set()
-        self._leaves_out = skip
+        self._leaves_out, self._counts = skip, counts
         table = _Table(len(wanted))
         size = left = self._size
         for line, block, values in self._parsed():
@@ -435,6 +446,9 @@ usecols=sorted(places), dtype=str, na_filter=False,
                 rows.append(values)
             elif self._leaves_out and column not in self.optional:
                 self.skipped.append((before + len(rows), f"line {number}"))
+                lost = len(self.skipped)
+                if self._counts and lost > _LOST_MAX and lost > before + len(rows):
+                    raise _HopelessError
             else:
                 raise _WrongCellError(f"line {number}{fault}", column, self._grouped)
         return list(np.array(rows, dtype=np.float64).reshape(len(rows), len(self._wanted)).T)
@@ -472,6 +486,10 @@ usecols=sorted(places), dtype=str, na_filter=False,
                 return f", column {column.name!r}: {wrong}", [], column.name
             values.append(value)
         return "", values, ""
+
+
+class _HopelessError(Exception):
+    """Most rows are wrong: no one wants the rest."""
 
 
 class _WrongCellError(Exception):
