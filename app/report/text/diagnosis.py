@@ -489,15 +489,13 @@ def step_table(outcome: DiagnoseOutcome) -> Table:
         stand = outcome.stands[i] if i < len(stages) - 1 else outcome.after
         if i == 0:
             stand = outcome.before
-        errors = pooled_errors(stand.validation)
+        fitted, errors = pooled_errors(stand.train), pooled_errors(stand.validation)
         noise = pooled_noise(stand.validation) or outcome.noise
         rows.append(
             Row(
                 (
                     name,
-                    NO_VALUE
-                    if not stand.train
-                    else significant(pooled_rms(stand.train) * shown.error_factor),
+                    NO_VALUE if fitted is None else significant(fitted.rms * shown.error_factor),
                     significant(stage.selection_rms * shown.error_factor),
                     NO_VALUE if errors is None else significant(errors.rms * shown.error_factor),
                     NO_VALUE if errors is None else significant(errors.rms / noise),
