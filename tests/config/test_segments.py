@@ -166,7 +166,7 @@ def test_a_kind_of_another_distribution_is_found_everywhere(tmp_path: Path) -> N
         (
             "other",
             "bad:Thing",
-            "from dearig.config.segments.levels import Hold as Thing",
+            "from dearig.config.segments.levels import HoldSegment as Thing",
             'must be of the type Literal["other"]',
         ),
     ],
