@@ -2,9 +2,9 @@
 
 Run as ``python -m tests.benchmarks.bench_misses --rows FILE [--first SEED] [--rigs N]
 [--seeds 3,17] [--generator second] [--train rich] [--noise KIND]``. Each rig is recorded and
-diagnosed as in the blind test. A miss is a rig whose error on untouched recordings is above 15 % over what the truth
-itself leaves, or whose hidden family is not named. Two further searches then use the library's laws
-of the hidden families alone, without a limit of work:
+diagnosed as in the blind test. A miss is a rig whose error on untouched recordings is above 15 %
+over what the truth itself leaves, or whose hidden family is not named. Two further searches then
+use the library's laws of the hidden families alone, without a limit of work:
 
 * *alone*: fitted to the training recordings, from the starts of the regression and from the optima
   of the second search; the fit with the best criterion counts, as in a diagnosis;
@@ -13,8 +13,8 @@ of the hidden families alone, without a limit of work:
 
 The cause is ``search`` if *alone* comes within 15 %: the laws and the recordings would have done.
 It is ``excitation`` if only *together* does: the training recordings do not determine the law or
-its numbers. It is ``form`` if neither does: no law of the family comes near. Within 15 % but misnamed
-has no error to explain. A change that happens once cannot be predicted (``once``).
+its numbers. It is ``form`` if neither does: no law of the family comes near. Within 15 % but
+misnamed has no error to explain. A change that happens once cannot be predicted (``once``).
 
 Each rig is a line of JSON in FILE, and is skipped the next time; ``--table`` prints the table of
 what is there.
@@ -47,7 +47,7 @@ from dearig.sim_backend.truth.cases import GENERATORS, TruthCase
 from dearig.sim_backend.truth.effects import sudden
 from tests.benchmarks.bench_ablation import _error
 from tests.blind.play import MODES, Bench, Case, records_of
-from tests.blind.score import WITHIN, Score, score
+from tests.blind.score import FAILED, WITHIN, Score, score
 
 SEARCH, EXCITATION, FORM = "search", "excitation", "form"
 REACHED, ONCE = "within 15 %", "once"
@@ -152,6 +152,8 @@ def row_of(bench: Bench, case: Case) -> dict[str, Any]:
     """Record and diagnose ``case``, and find where its error comes from."""
     result = bench.kept(case, any_sources=False) or bench.play(case)
     found = score(result)
+    if found.outcome == FAILED:
+        raise SystemExit(f"seed {case.seed}: {found.error}")
     row: dict[str, Any] = {
         "seed": case.seed, "mode": case.mode, "generator": case.generator, "noise": case.noise,
         "sources": result["sources"], "families": list(found.families),
