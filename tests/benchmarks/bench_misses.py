@@ -148,12 +148,15 @@ def cause_of(row: Mapping[str, Any]) -> str:
     return EXCITATION if row["together"]["validation"] <= WITHIN else FORM
 
 
-def row_of(bench: Bench, case: Case) -> dict[str, Any]:
-    """Record and diagnose ``case``, and find where its error comes from."""
+def row_of(bench: Bench, case: Case) -> dict[str, Any] | None:
+    """Record and diagnose ``case``, and find where its error comes from.
+
+    None where there is no diagnosis: an interlock may have ended the recording.
+    """
     result = bench.kept(case, any_sources=False) or bench.play(case)
     found = score(result)
     if found.outcome == FAILED:
-        raise SystemExit(f"seed {case.seed}: {found.error}")
+        return None
     row: dict[str, Any] = {
         "seed": case.seed, "mode": case.mode, "generator": case.generator, "noise": case.noise,
         "sources": result["sources"], "families": list(found.families),
@@ -211,11 +214,15 @@ def main() -> None:
             case = Case(seed, given.train, given.generator, given.noise)
             if (seed, given.train, given.generator, given.noise) in done:
                 continue
-            rows.append(row_of(bench, case))
+            row = row_of(bench, case)
+            if row is None:
+                print(f"{seed}: not diagnosed", flush=True)
+                continue
+            rows.append(row)
             with given.rows.open("a", encoding="utf-8") as lines:
-                lines.write(json.dumps(rows[-1]) + "\n")
-            cause = cause_of(rows[-1]) if rows[-1]["missed"] else "not missed"
-            print(f"{seed}: {rows[-1]['said']}, {rows[-1]['after']:.2f}, {cause}", flush=True)
+                lines.write(json.dumps(row) + "\n")
+            cause = cause_of(row) if row["missed"] else "not missed"
+            print(f"{seed}: {row['said']}, {row['after']:.2f}, {cause}", flush=True)
     sys.stdout.write(table(rows) + "\n")
 
 
