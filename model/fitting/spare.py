@@ -24,7 +24,7 @@ from dearig.model.fitting.intervals import (
     profile,
 )
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Estimate, Layout
+from dearig.model.fitting.parameters import Estimate, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import resolved_times
 
@@ -104,10 +104,10 @@ class Valleys:
         return tuple(sorted(found))
 
 
-class _Shared(Layout):
+class _Shared(FitLayout):
     """Layout whose coordinates are the sum of several moduli, and what each takes of the rest."""
 
-    def __init__(self, layout: Layout, total: int, parts: Sequence[int]) -> None:
+    def __init__(self, layout: FitLayout, total: int, parts: Sequence[int]) -> None:
         self.__dict__.update(layout.__dict__)
         self._total, self._parts = total, list(parts)
         self.lower, self.upper = layout.lower.copy(), layout.upper.copy()
@@ -144,7 +144,7 @@ class _Shared(Layout):
         return found
 
 
-def _columns(layout: Layout, branch: int) -> dict[tuple[str, int], int]:
+def _columns(layout: FitLayout, branch: int) -> dict[tuple[str, int], int]:
     """Return the places of a ``branch``'s parameters, by kind and place."""
     return {
         (q.kind, q.place): j
@@ -153,7 +153,7 @@ def _columns(layout: Layout, branch: int) -> dict[tuple[str, int], int]:
     }
 
 
-def _time(layout: Layout, branch: int) -> int:
+def _time(layout: FitLayout, branch: int) -> int:
     return _columns(layout, branch)["T", 0]
 
 
@@ -186,7 +186,7 @@ def valleys_of(best: Optimum, estimates: Sequence[Estimate]) -> Valleys | None:
 
 
 def _spare_and_firm(
-    layout: Layout, estimates: Sequence[Estimate]
+    layout: FitLayout, estimates: Sequence[Estimate]
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the branches whose relaxation time ``estimates`` do not determine, and the others.
 
@@ -298,7 +298,7 @@ def widened(
     return changed, tuple(_sum(found, branch, span) for branch, span in sums.items())
 
 
-def _cells(found: Valleys, sites: Sequence[int]) -> Layout:
+def _cells(found: Valleys, sites: Sequence[int]) -> FitLayout:
     """Return the layout in which each branch stays at its site: else two change places."""
     cell = copy(found.best.problem.layout)
     cell.lower, cell.upper = cell.lower.copy(), cell.upper.copy()

@@ -16,7 +16,7 @@ from dearig.model.fitting.estimates import (
     recentre,
 )
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Estimate, Layout
+from dearig.model.fitting.parameters import Estimate, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.report.text.estimates import estimate_table
 from dearig.report.text.tables import parameter_table
@@ -139,7 +139,7 @@ def test_intervals_take_the_model_to_its_optimum(changed: str) -> None:
     moved = add_intervals([record], off)
     assert moved.cost == pytest.approx(fit.cost, rel=1e-4)
     assert moved.correlation == pytest.approx(fit.correlation, rel=1e-2)
-    values = dict(zip(Layout(moved.model).names, Layout(moved.model).initial(), strict=True))
+    values = dict(zip(FitLayout(moved.model).names, FitLayout(moved.model).initial(), strict=True))
     for e, before in zip(moved.estimates, fit.estimates, strict=True):
         assert e.value == pytest.approx(values[e.name], rel=1e-9)
         if before.determined:
