@@ -17,7 +17,7 @@ from dearig.model.fitting.intervals import (
     natural_ends,
 )
 from dearig.model.fitting.levenberg import descend, gain_that_counts
-from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, Quantity
+from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.spare import Optimum, valleys_of, widened
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
@@ -190,7 +190,12 @@ def _ticks(
 
 
 def _estimate(
-    q: Quantity, value: float, span: tuple[float, float], held: bool, at_end: bool, followed: bool
+    q: FreeParameter,
+    value: float,
+    span: tuple[float, float],
+    held: bool,
+    at_end: bool,
+    followed: bool,
 ) -> Estimate:
     """Return the estimate of one parameter with the interval ``span``, and a note on it."""
     low, high = span

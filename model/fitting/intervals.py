@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import kolmogorov
 
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import FitLayout, Quantity
+from dearig.model.fitting.parameters import FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
 
 __all__ = [
@@ -114,7 +114,7 @@ def spectrum_distance(
     return away, 1.0 / (1.0 / lines[0] + 1.0 / lines[1])
 
 
-def natural_ends(q: Quantity, low: float, high: float) -> tuple[float, float]:
+def natural_ends(q: FreeParameter, low: float, high: float) -> tuple[float, float]:
     """Return the natural ends of an interval of the coordinate of ``q``.
 
     An open end of a spring's parameter is 0 or infinite, of an effect's the end of its range. A
