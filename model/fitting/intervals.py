@@ -10,17 +10,21 @@ import numpy as np
 from scipy.special import kolmogorov
 
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import FitLayout
+from dearig.model.fitting.parameters import FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
 
 __all__ = [
     "CHI2_95",
+    "BetterPoint",
+    "correlation_end",
     "correlation_time",
     "covariance",
     "firm_directions",
     "has_spectrum_of",
+    "is_determined",
     "is_flat",
     "linear_widths",
+    "natural_ends",
     "profile",
     "spectrum_distance",
     "unevenness",
@@ -32,6 +36,7 @@ _NORMAL_95 = math.sqrt(CHI2_95)
 #: determine. Derivatives by differences are known to some 1e-5; a smaller eigenvalue is the square
 #: of their error.
 _TOLD = 1e-10
+_DETERMINED_RATIO = 5.0  # ratio of the ends of an interval, above which a value is not quoted
 _POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: tolerance of its crossing
 _NEAR_A_LIMIT = 0.3  # the same for an undetermined limit, which is bounded to decades only
@@ -47,16 +52,34 @@ def correlation_time(residuals: np.ndarray) -> float:
     of independent ones. The sum ends at the first lag whose correlation is within the noise
     (Sokal's window needs a model).
     """
+    correlation = _correlation(residuals)
+    end = _lost_at(correlation, residuals.size)
+    return float(1.0 + 2.0 * correlation[1:end].sum())
+
+
+def correlation_end(residuals: np.ndarray) -> int:
+    """Return the first lag in samples at which ``residuals`` (N,) are no longer correlated.
+
+    It is at least 1, and at most a quarter of N.
+    """
+    return max(1, min(_lost_at(_correlation(residuals), residuals.size), residuals.size // 4))
+
+
+def _correlation(residuals: np.ndarray) -> np.ndarray:
+    """Return the autocorrelation at each lag below half the samples; 0 of what is constant."""
     n = residuals.size
     centred = residuals - residuals.mean()
     spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
     correlation = np.fft.irfft(spectrum)[: n // 2]
-    if correlation[0] <= 0.0:
-        return 1.0
-    correlation /= correlation[0]
-    lost = np.flatnonzero(correlation < 2.0 / math.sqrt(n))
-    end = int(lost[0]) if lost.size else correlation.size
-    return float(1.0 + 2.0 * correlation[1:end].sum())
+    if correlation.size == 0 or correlation[0] <= 0.0:
+        return np.zeros(n // 2)
+    return np.asarray(correlation / correlation[0])
+
+
+def _lost_at(correlation: np.ndarray, samples: int) -> int:
+    """Return the first lag at which a ``correlation`` is within the noise of so many samples."""
+    lost = np.flatnonzero(correlation < 2.0 / math.sqrt(samples))
+    return int(lost[0]) if lost.size else correlation.size
 
 
 def is_flat(residuals: np.ndarray) -> bool:
@@ -108,6 +131,26 @@ def spectrum_distance(
     lines = [2.0 * float(power.sum()) ** 2 / float(power @ power) for power in sums]
     away = float(np.max(np.abs(np.interp(other, place, summed) - also)))
     return away, 1.0 / (1.0 / lines[0] + 1.0 / lines[1])
+
+
+def natural_ends(q: FreeParameter, low: float, high: float) -> tuple[float, float]:
+    """Return the natural ends of an interval of the coordinate of ``q``.
+
+    An open end of a spring's parameter is 0 or infinite, of an effect's the end of its range. A
+    modulus at the lower end of its search range is 0.
+    """
+    if q.logarithmic:
+        low, high = math.exp(low), math.exp(high)
+    lowest, highest = q.bounds if q.kind == "effect" else (0.0, math.inf)
+    if q.kind == "mu" and low <= q.bounds[0]:
+        low = 0.0
+    return max(low, lowest), min(high, highest)
+
+
+def is_determined(low: float, high: float) -> bool:
+    """Whether an interval is narrow enough for its value to be quoted, and excludes 0."""
+    near, far = sorted((abs(low), abs(high)))
+    return low * high > 0.0 and far < math.inf and far / near <= _DETERMINED_RATIO
 
 
 def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:
@@ -168,6 +211,14 @@ def linear_widths(exact: np.ndarray, other: np.ndarray, directions: np.ndarray) 
         variances.append(np.einsum("ij,jk,ik->i", directions, inverse, directions))
     seen = variances[0] > 0.0
     return np.asarray(np.sqrt(variances[1][seen] / variances[0][seen]))
+
+
+class BetterPoint(Exception):  # noqa: N818  (it is no error)
+    """A point ``x`` (d,) whose chi-square is ``gained`` below that of the optimum of intervals."""
+
+    def __init__(self, x: np.ndarray, gained: float) -> None:
+        super().__init__("chi-square has a lower minimum")
+        self.x, self.gained = x, gained
 
 
 @dataclass(frozen=True)
@@ -240,6 +291,7 @@ def profile(
     held: np.ndarray,
     tick: Callable[[], None],
     sides: tuple[float, ...] = (-1.0, 1.0),
+    gain: float = math.inf,
 ) -> tuple[float, float]:
     """Return the 95 % interval of coordinate ``index`` by profile likelihood.
 
@@ -247,7 +299,8 @@ def profile(
     gives the step and the path of the others, ``inflation`` the factor by which chi-square
     counts less than its white-noise value, ``held`` (d,) bool the parameters that are not refitted.
     An end that the data do not determine, or that is not among ``sides``, is -inf or inf.
-    ``tick`` is called at each point.
+    ``tick`` is called at each point. Raises ``BetterPoint`` where chi-square is lower than at the
+    optimum by more than ``gain``.
     """
     layout = problem.layout
     fixed = held.copy()
@@ -278,17 +331,19 @@ def profile(
             at_bound = sign * (point - bound) >= 0.0
             step_before = abs(point - inside)
             # as much as moves the crossing by its tolerance: the quadratic model's word is taken
-            gain = 2.0 * near * threshold
+            little = 2.0 * near * threshold
             fit = descend(
                 problem,
                 guess,
                 fixed,
                 iterations=8,
-                gain=gain,
+                gain=little,
                 damping=1e-5,
                 patience=2,
                 quick=True,
             )
+            if chi2 - fit.cost * problem.samples > gain:
+                raise BetterPoint(fit.x, chi2 - fit.cost * problem.samples)
             excess = fit.cost * problem.samples - fit.to_gain - chi2
             z = math.sqrt(max(excess, 0.0) / threshold)
             if abs(z - 1.0) < near:
