@@ -17,6 +17,7 @@ from dearig.window.follow.page import FollowPage
 from dearig.window.high_voltage.status import LatchedAlarm
 from dearig.window.jobs.worker import Worker
 from dearig.window.recordings.page import RecordingsPage
+from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
@@ -62,6 +63,12 @@ def test_nothing_is_cut_or_covered_on_any_page_at_three_sizes(
     for page in window.pages:
         window.show_page(page)
         found += wrong(window, qtbot, page.title)
+    rig = window.page(RigPage)
+    window.show_page(rig)
+    rig.instruments.setCurrentWidget(rig.live)
+    rig.live.start()
+    qtbot.waitUntil(lambda: rig.live.table.rowCount() > 0, timeout=PATIENCE)
+    found += wrong(window, qtbot, "Rig, live values")
     window.session.block("test", f"rig file: {LONG}", "Rig")
     status.run_ended(LatchedAlarm("Stopped by an interlock", LONG, time.time(), "sim"))
     for page in window.pages:
