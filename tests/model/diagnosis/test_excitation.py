@@ -45,7 +45,7 @@ def test_a_gain_is_known_to_what_least_squares_leaves_of_it() -> None:
     """Equation (10), against fits of the two components of a gain to many noises."""
     time = np.arange(4000) * STEP
     shown = Motion(
-        "tone", STEP, np.zeros(1), 0.2 * NOISE * np.sin(2.0 * np.pi * 30.0 * time), NOISE
+        "tone", STEP, np.zeros(4000), 0.2 * NOISE * np.sin(2.0 * np.pi * 30.0 * time), NOISE
     )
     rng = np.random.default_rng(3)
     both = np.column_stack([np.sin(2.0 * np.pi * 30.0 * time), np.cos(2.0 * np.pi * 30.0 * time)])
@@ -108,7 +108,7 @@ def test_a_voltage_above_that_of_training() -> None:
     wrong = NOISE * np.random.default_rng(1).standard_normal(high.response.size)
     wrong[np.abs(high.drive) > 0.7 * np.max(high.drive)] += 5.0 * NOISE
     assert excitation([low], high, wrong).cause == LEVELS
-    assert excitation([motion("thesis")], high, wrong).above == 0.0
+    assert excitation([low, high], high, wrong).above == 0.0
 
 
 def test_a_displacement_beyond_that_of_training() -> None:
