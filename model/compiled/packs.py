@@ -14,9 +14,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from llvmlite import ir
+from numba import extending
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+from numba.extending import lower_builtin, models, register_model
 
 from dearig.model.compiled.jit import INTO_CALLER
 
@@ -24,19 +25,23 @@ __all__ = ["WIDTH", "Pack", "first", "lane", "of_packs", "rows", "spread", "with
 
 WIDTH = 4  #: films in a pack
 
+# numba's own types of these have the arguments of the compiler too
+intrinsic: Any = extending.intrinsic
+overload: Any = extending.overload
+
 _DOUBLE, _INDEX = ir.DoubleType(), ir.IntType(64)
 _VECTOR = ir.VectorType(_DOUBLE, WIDTH)
 _FLAGS = ("contract", "arcp", "nsz", "reassoc")  # as of all kernels (``jit``)
 
 
-class Pack(types.Type):  # type: ignore[misc]
+class Pack(types.Type):
     """Numba's type of one number of each of ``WIDTH`` films."""
 
     def __init__(self) -> None:
         super().__init__(name="Pack")
 
 
-class _Rows(types.Type):  # type: ignore[misc]
+class _Rows(types.Type):
     """Numba's type of an array (n, WIDTH) whose rows are packs."""
 
     def __init__(self) -> None:
@@ -47,19 +52,19 @@ _PACK, _ROWS = Pack(), _Rows()
 
 
 @register_model(Pack)
-class _PackModel(models.PrimitiveModel):  # type: ignore[misc]
+class _PackModel(models.PrimitiveModel):
     def __init__(self, manager: Any, of: Any) -> None:
         super().__init__(manager, of, _VECTOR)
 
 
 @register_model(_Rows)
-class _RowsModel(models.StructModel):  # type: ignore[misc]
+class _RowsModel(models.StructModel):
     def __init__(self, manager: Any, of: Any) -> None:
         members = [("data", types.voidptr), ("step", types.intp), ("count", types.intp)]
         super().__init__(manager, of, members)
 
 
-class _Arithmetic(AbstractTemplate):  # type: ignore[misc]
+class _Arithmetic(AbstractTemplate):
     """Types of an operation on two packs, or on a pack and a number."""
 
     def generic(self, args: Any, _kws: Any) -> Any:

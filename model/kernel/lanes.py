@@ -11,6 +11,8 @@ in that film's remainder, as everything is that it leaves out (``EXPONENTIAL.md`
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from dearig.model.coefficients import INERTIA, REST
@@ -44,7 +46,19 @@ _GRAIN = 1e-3  # of the stiffness: propagators of a log differ by more, see STIF
 
 
 @jit
-def _carry_plain(table, branches, propagator, y, origin, v0, v1, t, h, steps, trace):  # type: ignore[no-untyped-def]
+def _carry_plain(
+    table: np.ndarray,
+    branches: np.ndarray,
+    propagator: np.ndarray,
+    y: np.ndarray,
+    origin: np.ndarray,
+    v0: float,
+    v1: float,
+    t: float,
+    h: float,
+    steps: int,
+    trace: np.ndarray,
+) -> None:
     film_steps(
         0, table, table, rows(table), branches, propagator, rows(y), rows(origin)[0], v0, v1, t,
         0.0, h, steps, steps, trace,
@@ -52,13 +66,28 @@ def _carry_plain(table, branches, propagator, y, origin, v0, v1, t, h, steps, tr
 
 
 @jit
-def _carry(  # type: ignore[no-untyped-def]
-    moving, values, acting, memory, table, branches, propagator, y, origin, v0, v1, t, warmth, h,
-    steps, trace,
-):  # fmt: skip
+def _carry(
+    moving: int,
+    values: np.ndarray,
+    acting: np.ndarray,
+    memory: np.ndarray,
+    table: np.ndarray,
+    branches: np.ndarray,
+    propagator: np.ndarray,
+    y: np.ndarray,
+    origin: np.ndarray,
+    v0: float,
+    v1: float,
+    t: float,
+    warmth: float,
+    h: float,
+    steps: int,
+    trace: np.ndarray,
+) -> None:
+    films: Any = Lanes(values, acting)
     film_steps(
-        moving, Lanes(values, acting), memory, rows(table), branches, propagator, rows(y),
-        rows(origin)[0], v0, v1, t, warmth, h, steps, steps, trace,
+        moving, films, memory, rows(table), branches, propagator, rows(y), rows(origin)[0], v0, v1,
+        t, warmth, h, steps, steps, trace,
     )  # fmt: skip
 
 
@@ -188,10 +217,12 @@ def drive_in_lanes(
     for c in cs:
         others |= int(active_effects(c))
     log = np.zeros((time.size, LOG))
-    record = tuple(read_only(a) for a in (time, voltage, ends, air))
-    status, _, steps = drive_with_log(cs[0], *record, y, moved[0], rate[0], fidelity, others, log)
+    status, _, steps = drive_with_log(
+        cs[0], time, voltage, ends, air, y, moved[0], rate[0], fidelity, others, log
+    )
     shared = status == OK and bool(log[:-1, 0].all())
     if shared:
+        record = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
         shared = _drive(cs, *record, log, moved, rate)
         # a step of a pack takes as long as one of a film
         steps += steps * -(-len(cs) // WIDTH)
