@@ -10,7 +10,7 @@ import numpy as np
 from dearig.model.errors import ModelError
 from dearig.model.simulation.actuator import Drive
 
-__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "interpolated"]
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "interpolated", "mean_about"]
 
 _MATCHING = 10  # iterations; each leaves a third of the error of the one before
 
@@ -68,7 +68,7 @@ class ActuatorRecord:
 
     def seen(self, displacement: np.ndarray) -> np.ndarray:
         """Return a ``displacement`` (..., N) as it is read: averaged, from the lead-in's mean."""
-        return counted(_mean_about(displacement, self.means_of), self.lead_in)
+        return counted(mean_about(displacement, self.means_of), self.lead_in)
 
     def coarse(self, rate: float) -> ActuatorRecord:
         """Return the record at about ``rate`` Hz or less, in means of neighbours."""
@@ -115,7 +115,7 @@ class ActuatorRecord:
         )
 
 
-def _mean_about(values: np.ndarray, many: int) -> np.ndarray:
+def mean_about(values: np.ndarray, many: int) -> np.ndarray:
     """Return means over intervals of ``many`` readings, centred on ``values`` (..., N).
 
     Of as many samples of each interval, evenly spaced. From neighbours, to the fourth order in the

@@ -90,8 +90,20 @@ class Readings:
 
     @property
     def lag(self) -> float:
-        """Time in s from the film's motion to its reading."""
-        return self.recording.displacement_delay - self.recording.displacement_skew
+        """Time in s from the film's motion to its reading, on the clock of the drive.
+
+        A mean of conversions is about the mean of their ticks. The command was held for one
+        conversion after each tick, so that its mean belongs half a conversion later; the monitor
+        was converted at its skew.
+        """
+        recording = self.recording
+        lag = recording.displacement_delay - recording.displacement_skew
+        if recording.average == 1 or recording.samples < 2:
+            return lag
+        if self.drive == "monitor":
+            return lag + sum(c.skew for c in recording.channels if c.name == "voltage_monitor")
+        row = recording.duration / (recording.samples - 1)
+        return lag + 0.5 * row / recording.average
 
     @cached_property
     def voltage(self) -> Drive:
@@ -110,7 +122,8 @@ class Readings:
             noise = reading_noise(volts)
             if noise > 0.0:
                 volts = smoothed(volts, noise)
-            hold = self.is_held or recording.hold
+            # means of several conversions are on the line between their middles
+            hold = (self.is_held or recording.hold) and recording.average == 1
             return Drive(recording.time, volts, hold, warmth, moisture, temperature, humidity)
         except ModelError as error:
             raise InputError(f"{recording.path}: {error}") from error
@@ -172,6 +185,7 @@ class Readings:
             self.lag,
             valid,
             self.lead_in,
+            means_of=recording.average,
             lag_error=recording.displacement_delay_error,
             rounding=noise.step / math.sqrt(12.0),
         )

@@ -36,6 +36,7 @@ class Exported:
     """
 
     hold: bool = False
+    average: int = 1
     kinematics: str | None = None
     film: Film | None = None
     load: Load | None = None
@@ -52,6 +53,7 @@ def exported(about: Mapping[str, str]) -> Exported:
     kinematics = about.get("kinematics")
     return Exported(
         hold=about.get("hold") == ZERO_ORDER,
+        average=_whole(about.get("average", "")),
         kinematics=kinematics if kinematics in KINEMATICS else None,
         film=_made(Film, about.get("film", "")),
         load=_made(Load, about.get("load", "")),
@@ -60,6 +62,11 @@ def exported(about: Mapping[str, str]) -> Exported:
         rest_reading=_number(about.get("rest_reading", "")),
         events=tuple(_events(about.get("events", ""))),
     )
+
+
+def _whole(text: str) -> int:
+    """Return a whole number of 1 or more; 1 for any other text."""
+    return max(int(text), 1) if text.isascii() and text.isdigit() and len(text) < 10 else 1
 
 
 def _number(text: str) -> float | None:

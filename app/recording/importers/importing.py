@@ -14,6 +14,7 @@ from dearig.errors import InputError, Note, hints_of
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.progress import Progress, part, quiet
 from dearig.recording.content.assumed import ASSUMED, FILM_VALUES, assumed_of
+from dearig.recording.content.layout import AVERAGE_COLUMN
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
 from dearig.recording.files import check_output, file_sha256
@@ -31,7 +32,7 @@ from dearig.recording.importers.columns.values import Values, values_of
 from dearig.recording.importers.exported import exported
 from dearig.recording.importers.quantities.units import Scale
 from dearig.recording.importers.registry import source_at
-from dearig.recording.importers.source import NeedsOptionError
+from dearig.recording.importers.source import NeedsOptionError, Source
 from dearig.recording.writing.save import save_recording
 
 __all__ = [
@@ -118,6 +119,7 @@ class Prepared:
     values: Values
     metadata: RunMetadata
     hold: bool
+    average: int
     kinematics: str | None
     rest_reading: float
     events: tuple[Event, ...]
@@ -168,6 +170,7 @@ def import_file(
         found.values.columns,
         found.metadata,
         hold=found.hold,
+        average=found.average,
         kinematics=found.kinematics,
         rest_reading=found.rest_reading,
         events=found.events,
@@ -215,6 +218,7 @@ def prepare(
             raise
     progress("checking", READ)
     was = exported(table.about)
+    average = max(was.average, _average_of(table))
     noted = _provenance(path, digest.result(), chosen, options)
     noted = {**was.origin, **noted, **metadata.provenance}
     film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
@@ -236,10 +240,28 @@ def prepare(
             provenance=noted,
         ),
         hold=was.hold and values.kind == "actuator",
+        average=average,
         kinematics=kinematics or (None if values.kind == "actuator" else "uniaxial"),
         rest_reading=rest,
         events=tuple(_events(values, was.events)),
     )
+
+
+def _average_of(table: Source) -> int:
+    """Return how many conversions each row is the mean of, as an exported table says it; else 1.
+
+    Raises ``InputError`` for a column of that name which is not one whole number.
+    """
+    if AVERAGE_COLUMN not in table.names:
+        return 1
+    values = table.read([AVERAGE_COLUMN])[AVERAGE_COLUMN]
+    first = float(values[0]) if values.size else 1.0
+    if not (first >= 1.0 and first.is_integer() and (values == first).all()):
+        raise InputError(
+            f"{table.path}: the column {AVERAGE_COLUMN} must hold one whole number of 1 or more in "
+            f"all rows: the number of conversions whose mean a row is"
+        )
+    return int(first)
 
 
 def _typed(options: ImportOptions) -> list[tuple[str, str | float]]:
