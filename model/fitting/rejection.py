@@ -15,7 +15,7 @@ __all__ = ["misfit_p"]
 _REST_MIN = 100  # readings at rest: fewer tell neither size nor colour of the noise
 
 
-def misfit_p(residual: np.ndarray, rest: np.ndarray) -> float | None:
+def misfit_p(residual: np.ndarray, rest: np.ndarray, *, averaged: bool = False) -> float | None:
     """Return the probability that noise as that at rest leaves such a residual or a worse one.
 
     Parameters
@@ -24,6 +24,9 @@ def misfit_p(residual: np.ndarray, rest: np.ndarray) -> float | None:
         Measured less model (N,), in any unit, NaN where a reading must not be used.
     rest
         Readings before the voltage (M,), in the same unit.
+    averaged
+        Whether the readings are means of conversions: neighbours then share readings of a sensor
+        that averages too, and their noise is not white, even where the few at rest seem to be.
 
     Returns
     -------
@@ -35,7 +38,7 @@ def misfit_p(residual: np.ndarray, rest: np.ndarray) -> float | None:
     Two tests, of which the smaller probability counts twice (Bonferroni). Size: the ratio of both
     mean squares is distributed as F, with the degrees of freedom that a variance from correlated
     readings with the kurtosis of those at rest has, 2 n/((k - 1) tau). Colour: the summed
-    periodogram against a straight line where the readings at rest are white (Bartlett), else
+    periodogram against a straight line where single readings at rest are white (Bartlett), else
     against theirs (Kolmogorov and Smirnov). Noise slower than the readings at rest last is not
     known to either: it is taken for a misfit.
     """
@@ -49,6 +52,7 @@ def misfit_p(residual: np.ndarray, rest: np.ndarray) -> float | None:
     size = f_distribution.sf(
         float(np.mean(left**2)) / variance, left.size / apart, max(still.size / apart - 1.0, 1.0)
     )
-    away, lines = spectrum_distance(left, None if is_flat(still) else still)
+    is_white = not averaged and is_flat(still)
+    away, lines = spectrum_distance(left, None if is_white else still)
     colour = kolmogorov(away * math.sqrt(lines))
     return float(min(1.0, 2.0 * min(float(size), float(colour))))

@@ -34,8 +34,8 @@ class ActuatorRecord:
     model is evaluated at ``time - lag``; it is known within ``lag_error``. ``valid`` (N,)
     bool is False where a reading must not be used (a dropout, a clipped sensor), None where all are
     good. Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it
-    is counted from there. Each reading is the mean of ``means_of`` that were taken, evenly about
-    its time. ``coarse_drive``, where there is one, is the drive in fewer and longer steps
+    is counted from there. Each reading is the mean of ``means_of`` conversions that were taken
+    evenly about its time; the rig recorded means of ``average``. ``coarse_drive``, where there is one, is the drive in fewer and longer steps
     (``dearig.model.fitting.coarse_drive``); the effect of a parameter is estimated with it.
     ``rounding`` m is the part of ``noise`` that is the step of coarse readings: neighbours are
     rounded alike, so that their mean keeps it.
@@ -49,6 +49,7 @@ class ActuatorRecord:
     valid: np.ndarray | None = None
     lead_in: int = 0
     means_of: int = 1
+    average: int = 1
     lag_error: float = 0.0
     coarse_drive: Drive | None = None
     rounding: float = 0.0

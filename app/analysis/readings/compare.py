@@ -84,6 +84,7 @@ def compare(
         quiet_count=noise.count if noise and noise.source == LEAD_IN else 0,
         origin=origin_of(recording, hashed),
         step=_converter_step(recording),
+        average=recording.average,
     )
 
 

@@ -186,6 +186,7 @@ class Readings:
             valid,
             self.lead_in,
             means_of=recording.average,
+            average=recording.average,
             lag_error=recording.displacement_delay_error,
             rounding=noise.step / math.sqrt(12.0),
         )
