@@ -9,7 +9,7 @@ import numpy as np
 
 from dearig.drivers.channels import Channel
 from dearig.drivers.errors import RigError
-from dearig.drivers.gate import Prediction, admit
+from dearig.drivers.gate import FilmForecast, admit
 from dearig.drivers.instruments.amplifier import Monitors
 from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.instruments.laser import LaserDriver, LaserInspection
@@ -145,7 +145,7 @@ def _at_zero(
     rate = float(settings.card.conversion_rate_Hz)
     zero = np.zeros(max(_SAMPLES_MIN, round(_SECONDS * rate)))
     # any film's limits admit 0 V
-    prediction = Prediction(np.full(zero.size, 1.0 / film.thickness), film.electric_volume)
+    prediction = FilmForecast(np.full(zero.size, 1.0 / film.thickness), film.electric_volume)
     rate = rig.load(admit(zero, rate, limits, prediction))
     rig.arm()
     rig.start()

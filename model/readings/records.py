@@ -31,14 +31,14 @@ class ActuatorRecord:
 
     ``noise`` is the standard deviation of one reading in m. ``lag`` is the known time in s by which
     a reading is older than its time stamp (an averaging sensor), less the converter's skew: the
-    model is evaluated at ``time - lag``; it is known within ``lag_error``. ``valid`` (N,)
-    bool is False where a reading must not be used (a dropout, a clipped sensor), None where all are
-    good. Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it
-    is counted from there. Each reading is the mean of ``means_of`` conversions that were taken
-    evenly about its time; the rig recorded means of ``average``. ``coarse_drive``, where there is one, is the drive in fewer and longer steps
-    (``dearig.model.fitting.coarse_drive``); the effect of a parameter is estimated with it.
-    ``rounding`` m is the part of ``noise`` that is the step of coarse readings: neighbours are
-    rounded alike, so that their mean keeps it.
+    model is evaluated at ``time - lag``; it is known within ``lag_error``. ``valid`` (N,) bool is
+    False where a reading must not be used (a dropout, a clipped sensor), None where all are good.
+    Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it is
+    counted from there. Each reading is the mean of ``means_of`` conversions that were taken evenly
+    about its time; the rig recorded means of ``average``. ``coarse_drive``, where there is one, is
+    the drive in fewer and longer steps (``dearig.model.fitting.coarse_drive``); the effect of a
+    parameter is estimated with it. ``rounding`` m is the part of ``noise`` that is the step of
+    coarse readings: neighbours are rounded alike, so that their mean keeps it.
     """
 
     name: str

@@ -41,7 +41,7 @@ from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
 from dearig.window.session.page import Page
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["RigPage"]
 
@@ -66,7 +66,7 @@ class RigPage(Page):
         self._typing = False  # a name or server is typed, and not taken
         self.forms: dict[str, Form] = {}  # made when their tab is first shown
         self._areas: dict[str, QScrollArea] = {}
-        self.file = TextFile("rig file", session.rig_text, session.rig_path)
+        self.file = EditedFile("rig file", session.rig_text, session.rig_path)
         self._checks = Background(self)
         self._checks.done.connect(self._checked)
         self._checks.failed.connect(lambda words: self.summary.show_text(words))
@@ -169,7 +169,7 @@ class RigPage(Page):
         session = self.session
         if session.rig_text not in (self.text, self._in_force):  # another page opened another file
             self.text = self._in_force = session.rig_text
-            self.file = TextFile("rig file", self.text, session.rig_path)
+            self.file = EditedFile("rig file", self.text, session.rig_path)
             self._show_all()
 
     # the rig file
@@ -178,7 +178,7 @@ class RigPage(Page):
         """Change one key; a rig file with faults shows them, is not used, and blocks arming."""
         self._take(with_key(self.text, table, key, value), self.file)
 
-    def restore(self, text: str, file: TextFile) -> None:
+    def restore(self, text: str, file: EditedFile) -> None:
         """Replace the rig file by the unsaved one of an earlier window."""
         self._take(text, file)
         self._show_all()
@@ -188,8 +188,8 @@ class RigPage(Page):
         self._checks.close()
         self.files.close()
 
-    @Slot(str, TextFile)
-    def _opened(self, text: str, file: TextFile) -> None:
+    @Slot(str, EditedFile)
+    def _opened(self, text: str, file: EditedFile) -> None:
         self._take(text, file)
         self._show_all()
 
@@ -197,7 +197,7 @@ class RigPage(Page):
     def _saved(self) -> None:
         self._take(self.text, self.file)  # the path may be another one
 
-    def _take(self, text: str, file: TextFile) -> None:
+    def _take(self, text: str, file: EditedFile) -> None:
         try:
             faults = faults_of(text)
         except InputError as error:
@@ -465,5 +465,5 @@ class RigPage(Page):
     @Slot()
     def _ask_defaults(self) -> None:
         if self.files.confirm_discard():
-            self._take("", TextFile("rig file", ""))
+            self._take("", EditedFile("rig file", ""))
             self._show_all()

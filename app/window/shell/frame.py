@@ -53,7 +53,7 @@ from dearig.window.session.layout_state import GROUP
 from dearig.window.session.page import Page
 from dearig.window.session.settings import kept_bytes, kept_number, kept_text
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 from dearig.window.shell.banners import Banners
 from dearig.window.shell.compilation import Compilation, CompilationBar
 from dearig.window.shell.error_panel import ErrorPanel
@@ -221,7 +221,7 @@ class MainWindow(QMainWindow):
         """Offer the unsaved texts of a window that ended without a question."""
         kinds = {kind.edits: kind for kind in PAGES if kind.edits}
 
-        def restore(text: str, file: TextFile) -> None:
+        def restore(text: str, file: EditedFile) -> None:
             self.page(kinds[file.what]).restore(text, file)
 
         offer_unsaved(self, self.session, dict.fromkeys(kinds, restore))
