@@ -99,6 +99,14 @@ def test_a_wrong_model_learns(learned):
     assert learned.status == "complete"
 
 
+def test_a_target_is_followed_in_means_of_conversions(tmp_path):
+    rig_file = RigFile(card=CardSettings(sample_rate_Hz=200.0, average=10))
+    (run,) = followed(tmp_path / "out", rig_file=rig_file).runs
+    assert open_recording(run.recording).average == 10
+    # a reading that is taken for half a row older or younger errs by 1 um RMS on this path
+    assert run.rms < 1.1 * run.noise
+
+
 RINGING = ModelFile(
     "ringing",
     Actuator(
