@@ -81,10 +81,13 @@ def figure(found: dict[int, dict[str, float]], out: Path) -> None:
     axes = drawn.add_subplot()
     averages = np.array(sorted(found), dtype=np.float64)
     axes.loglog(averages, averages**-0.5, color=style.ERROR, lw=0.8, ls="--", label="1/√N")
-    colours = (style.THESIS, style.MODEL, style.MEASURED)
-    for (name, (label, _, _)), colour, mark in zip(CHANNELS.items(), colours, "os^", strict=True):
+    # the monitors fall alike: one mark lies around the other
+    drawing = ((style.THESIS, "o", 8), (style.MODEL, "s", 3), (style.MEASURED, "^", 5))
+    for (name, (label, _, _)), (colour, mark, size) in zip(CHANNELS.items(), drawing, strict=True):
         ratio = [found[int(n)][name] / found[1][name] for n in averages]
-        axes.loglog(averages, ratio, color=colour, marker=mark, ms=4, lw=1.0, label=label)
+        axes.loglog(
+            averages, ratio, color=colour, marker=mark, ms=size, mfc="none", lw=1.0, label=label
+        )
     axes.set_xlabel("conversions per row, N")
     axes.set_ylabel("noise over that of N = 1")
     axes.set_xticks(averages, [f"{n:g}" for n in averages])
