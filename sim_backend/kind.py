@@ -10,6 +10,7 @@ import numpy as np
 from dearig.drivers.channels import Channel
 from dearig.drivers.errors import RigError
 from dearig.drivers.gate import FilmForecast, admit
+from dearig.drivers.inputs import Inputs
 from dearig.drivers.instruments.amplifier import Monitors
 from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.instruments.laser import LaserDriver, LaserInspection
@@ -26,7 +27,7 @@ from dearig.drivers.rig import Rig, RigIdentity
 from dearig.drivers.rig_kind import RigOptions
 from dearig.drivers.settings import LaserSettings, RigSettings
 from dearig.model.film.material import Film
-from dearig.sim_backend.factory import open_simulated_rig
+from dearig.sim_backend.factory import open_simulated_inputs, open_simulated_rig
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.keyence import SimulatedController
 from dearig.sim_backend.room import SimulatedSource, air_of_run
@@ -50,6 +51,12 @@ class SimulatedKind:
             address, settings, options.film, options.load, seed=options.seed, paced=options.paced,
             actuator=options.actuator, faults=options.faults,
         )  # fmt: skip
+
+    def open_inputs(self, address: str, settings: RigSettings, options: RigOptions) -> Inputs:
+        """Return the inputs of the rig at ``address`` at rest; raises as ``open``."""
+        return open_simulated_inputs(
+            address, settings, options.film, options.load, actuator=options.actuator
+        )
 
     def inspect(
         self, address: str, settings: RigSettings, options: RigOptions

@@ -121,6 +121,14 @@ def views(window: MainWindow) -> Iterator[str]:
     folder = session.folder
     window.show_page(window.page(RigPage))
     yield "rig"
+    rig = window.page(RigPage)
+    rig.instruments.setCurrentWidget(rig.live)
+    rig.live.start()
+    until(lambda: rig.live.table.rowCount() > 0, "the inputs")
+    _work(3000)
+    yield "rig-live"
+    rig.live.stop()
+    rig.instruments.setCurrentIndex(0)
     window.show_page(window.sequence_page)
     yield "sequence"
     planned(session, REFUSED)

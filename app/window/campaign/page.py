@@ -350,13 +350,13 @@ class CampaignPage(Page):
     def _show_present(self) -> None:
         run, stage = self._queue.running, self._stage
         if self._thread is None:
-            self.controls.present.setText("")
+            self.controls.present.show_text("")
         elif run is not None and self._runner.status.state is HighVoltage.UNKNOWN:
-            self.controls.present.setText(f"{run.name} · the output is unknown, the run is ending")
+            self.controls.present.show_text(f"Output unknown, the run is ending · {run.name}")
         elif run is not None:
-            self.controls.present.setText(f"{run.name} · {stage.partition(', ')[2] or stage}")
+            self.controls.present.show_text(f"{run.name} · {stage.partition(', ')[2] or stage}")
         else:
-            self.controls.present.setText(stage[:1].upper() + stage[1:])
+            self.controls.present.show_text(stage[:1].upper() + stage[1:])
 
     @Slot(object)
     def _ended(self, end: RunEnd) -> None:

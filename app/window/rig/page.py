@@ -39,6 +39,7 @@ from dearig.window.kit.fields import form_fields, in_words
 from dearig.window.kit.form import Form
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
+from dearig.window.rig.live_inputs import LiveInputs
 from dearig.window.session.page import Page
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import EditedFile
@@ -132,7 +133,14 @@ class RigPage(Page):
     def check(self) -> None:
         """Check the instruments; the output stays at 0 V."""
         address, rig_file = self.session.address, self.session.rig_file
-        self._checks.start(lambda: (rig_file, check_rig(address, rig_file)))
+        self.live.stop()  # it has the inputs
+        self.instruments.setCurrentIndex(0)
+
+        def look() -> tuple[RigFile, CheckOutcome]:
+            self.live.wait()
+            return rig_file, check_rig(address, rig_file)
+
+        self._checks.start(look)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Check a simulated rig when the page is shown; a real one waits for the button."""
@@ -185,6 +193,7 @@ class RigPage(Page):
 
     def close_work(self) -> None:
         """Wait for the threads."""
+        self.live.close_work()
         self._checks.close()
         self.files.close()
 
@@ -387,7 +396,16 @@ class RigPage(Page):
         row.addWidget(self.check_button)
         column.addLayout(row)
         self.summary = Message()
-        column.addWidget(self.summary)
+        self.live = LiveInputs(self.session)
+        checked = QWidget()
+        results = QVBoxLayout(checked)
+        results.setContentsMargins(0, SPACE // 2, 0, 0)
+        results.addWidget(self.summary)
+        self.instruments = QTabWidget()
+        self.instruments.addTab(checked, "Check")
+        self.instruments.addTab(self.live, "Live values")
+        self.instruments.setTabToolTip(1, "Every input at rest, with its noise; nothing is output")
+        column.addWidget(self.instruments, 1)
         self.findings = QTableWidget(0, 4)
         self.findings.setHorizontalHeaderLabels(("", "Instrument", "Item", "Result"))
         self.findings.verticalHeader().hide()
@@ -402,7 +420,7 @@ class RigPage(Page):
         header.resizeSection(1, 120)  # px; the tooltip has the whole name
         header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
         self.findings.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        column.addWidget(self.findings, 1)
+        results.addWidget(self.findings, 1)
         return card(column)
 
     def _make_editor_card(self) -> QWidget:
