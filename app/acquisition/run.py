@@ -245,7 +245,7 @@ def record(
         return RunResult(
             recorder.path, recorder.samples, rate, "finished", events,
             waveform.margins if loop is None else loop.gate.margins, run.output_state,
-            None if loop is None else loop.report(),
+            None if loop is None else loop.report(), rows.average,
         )  # fmt: skip
     finally:
         try:

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from dearig.acquisition import run as run_module
+from dearig.acquisition.check import check_rig
 from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import plan
 from dearig.acquisition.run import RunObserver, RunOptions, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
+from dearig.drivers.errors import RigError
 from dearig.drivers.rig import Block
 from dearig.drivers.row_means import RowMeans, row_channels
 from dearig.drivers.settings import CardSettings, InterlockSettings
@@ -22,8 +24,11 @@ from dearig.errors import InputError, SafetyStop
 from dearig.model.film.material import TABLE_3
 from dearig.model.simulation.actuator import Actuator
 from dearig.recording import open_recording
+from dearig.sim_backend.card import Converters
+from dearig.sim_backend.streams import Streams
 from tests.acquisition.test_replay import counts, same
 from tests.tools.command import LOBE, done, write
+from tests.tools.daqmx import Served, served
 
 LOADED = parse_sequence(LOBE, "lobe", Path())
 N = 20
@@ -192,3 +197,45 @@ def test_the_same_voltage_at_the_same_place_of_a_row(runs: tuple[Path, Path]) ->
     assert averaged.voltage_command is not None
     between = np.interp(averaged.time, fast.time, fast.voltage_command)
     assert np.abs(averaged.voltage_command - between).max() < 0.5
+
+
+def address_of(card: Served) -> str:
+    return f"daqmx:Dev1@127.0.0.1:{card.server.port}"
+
+
+def test_a_card_plays_and_records_means(tmp_path: Path) -> None:
+    card = CardSettings(sample_rate_Hz=ROW_RATE, average=N, i_have_no_watchdog=True, **QUICK)
+    rig_file = AVERAGED.model_copy(
+        update={"card": card, "film": AVERAGED.film.model_copy(update={"name": "A"})}
+    )
+    path = tmp_path / "run.h5"
+    with served(rig_file) as server:
+        result = record(LOADED, address_of(server), rig_file, path)
+        changes = {round(change.wire) for change in server.device.history()}
+    recording = open_recording(path)
+    assert (result.rate_Hz, recording.rate, recording.average) == (ROW_RATE, ROW_RATE, N)
+    assert recording.samples == plan(LOADED, rig_file).rows
+    assert recording.voltage_command is not None
+    planned = plan(LOADED, rig_file).admitted().window()
+    means = planned[: recording.samples * N].reshape(-1, N).mean(axis=1)
+    assert np.abs(recording.voltage_command - means).max() < 0.3
+    assert len(changes) > recording.samples  # the output moved between rows
+
+
+def test_a_card_that_is_too_slow_for_the_conversions_is_found() -> None:
+    card = CardSettings(
+        sample_rate_Hz=10_000.0, average=40, first_convert_us=0.0, convert_interval_us=0.5,
+        ai_rate_max_kHz=4000.0, ao_rate_max_kHz=4000.0, i_have_no_watchdog=True,
+    )  # fmt: skip
+    with served() as server:
+        found = check_rig(address_of(server), RigFile(card=card)).findings
+    (rate,) = [f for f in found if f.item == "card.sample_rate_Hz x card.average"]
+    assert (rate.found, rate.verdict) == ("400000", "wrong")
+    assert rate.advice == "lower one of them"
+
+
+def test_the_simulated_card_refuses_a_rate_of_conversions_that_it_does_not_have() -> None:
+    card = CardSettings(average=N)
+    converters = Converters(RigFile(card=card), Streams((1,)))
+    with pytest.raises(RigError, match=r"400000 Hz, card\.sample_rate_Hz times card\.average = 20"):
+        converters.actual_rate(4e5)
