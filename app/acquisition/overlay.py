@@ -75,7 +75,7 @@ class Overlay:
         self._lag = 0.0 if reading is None else reading.delay - reading.skew
         if average > 1:
             # as ``Readings.lag`` of the recording
-            self._lag += channels[self._row].skew if drive == "monitor" else 0.5 / (rate * average)
+            self._lag += 0.5 / (rate * average)
         self._holds = average == 1
         self._rate = rate
         self._length = actuator.film.length

@@ -101,10 +101,14 @@ def test_a_wrong_model_learns(learned):
 
 def test_a_target_is_followed_in_means_of_conversions(tmp_path):
     rig_file = RigFile(card=CardSettings(sample_rate_Hz=200.0, average=10))
-    (run,) = followed(tmp_path / "out", rig_file=rig_file).runs
+    outcome = followed(tmp_path / "out", rig_file=rig_file)
+    (run,) = outcome.runs
     assert open_recording(run.recording).average == 10
-    # a reading that is taken for half a row older or younger errs by 1 um RMS on this path
-    assert run.rms < 1.1 * run.noise
+    expected = outcome.inversion.reading
+    left, speed = run.measured - expected, 200.0 * np.gradient(expected)
+    late = -np.nansum(left * speed) / np.sum(speed**2)
+    assert abs(late) < 2e-4  # of a row of 5 ms, nine tenths of which the rig is ahead
+    assert np.nanstd(left) < 1.2 * run.noise
 
 
 RINGING = ModelFile(

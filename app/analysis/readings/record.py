@@ -92,16 +92,13 @@ class Readings:
     def lag(self) -> float:
         """Time in s from the film's motion to its reading, on the clock of the drive.
 
-        A mean of conversions is about the mean of their ticks. The command was held for one
-        conversion after each tick, so that its mean belongs half a conversion later; the monitor
-        was converted at its skew.
+        A mean of conversions is about the mean of their ticks. The voltage was held for one
+        conversion after each tick, so that its mean belongs half a conversion later.
         """
         recording = self.recording
         lag = recording.displacement_delay - recording.displacement_skew
         if recording.average == 1 or recording.samples < 2:
             return lag
-        if self.drive == "monitor":
-            return lag + sum(c.skew for c in recording.channels if c.name == "voltage_monitor")
         row = recording.duration / (recording.samples - 1)
         return lag + 0.5 * row / recording.average
 
