@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from dearig.analysis.readings.early_ends import choose
 from dearig.analysis.readings.opening import Source, open_all
@@ -119,7 +120,8 @@ class Readings:
             noise = reading_noise(volts)
             if noise > 0.0:
                 volts = smoothed(volts, noise)
-            # means of several conversions are on the line between their middles
+            if recording.average > 1:
+                volts = _with_means(volts)
             hold = (self.is_held or recording.hold) and recording.average == 1
             return Drive(recording.time, volts, hold, warmth, moisture, temperature, humidity)
         except ModelError as error:
@@ -211,6 +213,18 @@ def read_all(
 def recordings_of(readings: Iterable[Readings]) -> list[Recording]:
     """Return the recordings of ``readings``."""
     return [each.recording for each in readings]
+
+
+def _with_means(means: np.ndarray) -> np.ndarray:
+    """Return the voltage (N,) at the middles of rows, between which it is linear, with ``means``.
+
+    The mean of such a line over a row, half-way to each neighbour, is (v[-1] + 6 v[0] + v[1])/8.
+    The square of the voltage, which pulls, then has the right mean too, to the fourth order.
+    """
+    bands = np.full((3, means.size), 0.125)
+    bands[1] = 0.75
+    bands[1, [0, -1]] = 0.875  # beyond the ends it stands still
+    return np.asarray(solve_banded((1, 1), bands, means))
 
 
 def noise_texts(readings: Iterable[Readings]) -> list[str]:

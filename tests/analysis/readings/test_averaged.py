@@ -98,18 +98,6 @@ def test_a_record_of_means_says_so(runs: dict[int, Path]) -> None:
     )
 
 
-SLOW = """\
-name = "slow"
-lead_in_s = 1.0
-tail_s = 4.0
-[[segment]]
-kind = "half_sine"
-amplitude_kV = 7.0
-frequency_Hz = 0.5
-repeats = 4
-"""
-
-
 def scaled(place: int, factor: float) -> Actuator:
     """Return the true film with one of its moduli or relaxation times changed."""
     springs, times = list(TABLE_3.springs), list(TABLE_3.times)
@@ -121,11 +109,10 @@ def scaled(place: int, factor: float) -> Actuator:
     return replace(TRUTH, network=Network(springs[0], branches))
 
 
-def test_moduli_and_relaxation_times_have_no_bias(tmp_path: Path) -> None:
-    card = CardSettings(sample_rate_Hz=500.0, average=10)
-    path = tmp_path / "slow.h5"
-    record(parse_sequence(SLOW, "slow", Path()), "sim", RigFile(card=card), path)
-    record_ = Readings(open_recording(path)).record
+@pytest.mark.parametrize("average", [10, 100])
+def test_moduli_and_relaxation_times_have_no_bias(runs: dict[int, Path], average: int) -> None:
+    # rows of 5 ms, within which the voltage of the fast lobes bends
+    record_ = Readings(open_recording(runs[average])).record
 
     def seen(model: Actuator) -> np.ndarray:
         return record_.seen(model.simulate(record_.drive, record_.lag).displacement)
@@ -136,6 +123,5 @@ def test_moduli_and_relaxation_times_have_no_bias(tmp_path: Path) -> None:
     step = 1e-3
     slopes = [(seen(scaled(i, 1.0 + step)) - true) / (step * record_.noise) for i in range(7)]
     basis = np.linalg.qr(np.stack(slopes, axis=1))[0]
-    # what a fit gains by leaving the truth: chi-square of 7 degrees of freedom, 99.9 %; neighbours
-    # that share a laser's window count a little less than single
-    assert float(np.sum((basis.T @ left) ** 2)) < 1.2 * 24.3
+    # what a fit gains by leaving the truth: chi-square of 7 degrees of freedom, 99.9 %
+    assert float(np.sum((basis.T @ left) ** 2)) < 24.3
