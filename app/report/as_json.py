@@ -14,6 +14,8 @@ from dearig.analysis.outcomes import (
     pooled_steady_rms,
 )
 from dearig.model.verdict import is_rejected, smallest_p
+from dearig.report.made import made_now
+from dearig.report.stored import stored
 from dearig.report.text.laws import effect_named, law_json
 from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
@@ -55,6 +57,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
             **_rejection_json(outcome.comparisons),
             "recordings": [_comparison_json(c) for c in outcome.comparisons],
             "warnings": list(warnings_of(outcome)),
+            "report": stored((outcome,), made_now()),
         }
     fit = outcome.fit
     known = fit.covariance.size > 0
@@ -81,6 +84,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "assumed": outcome.assumed,
         "seconds": _number(outcome.seconds),
         "warnings": list(warnings_of(outcome)),
+        "report": stored((outcome,), made_now()),
     }
 
 
@@ -313,6 +317,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "model_path": outcome.model_path,
         "simulations": int(finding.simulations),
         "seconds": _number(outcome.seconds),
+        "report": stored((outcome,), made_now()),
     }
 
 
