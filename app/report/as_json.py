@@ -72,6 +72,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "residual_over_noise": _number(pooled_over_noise(outcome.train)),
         **_rejection_json(outcome.train),
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
+        "sums": [_parameter_json(e, known) for e in fit.sums],
         "covariance": covariance_table(fit.covariance_names, fit.covariance),
         "uncertainty_budget": budget_table(fit.budget),
         "train": [_comparison_json(c) for c in outcome.train],
@@ -292,6 +293,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "seconds": _number(experiment.seconds),
         },
         "experiment_words": outcome.experiment_words,
+        "excitation": _excitation_json(outcome),
         "rounds": [
             {
                 "base": list(r.base),
@@ -308,6 +310,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "assumed": outcome.assumed,
         "performed": list(outcome.performed),
         "parameters": [_effect_number_json(e) for e in finding.final.estimates],
+        "sums": [_effect_number_json(e) for e in finding.final.sums],
         "covariance": covariance_table(finding.final.covariance_names, finding.final.covariance),
         "uncertainty_budget": budget_table(finding.final.budget),
         "intervals_conditional": outcome.is_rejected,
@@ -318,6 +321,49 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "simulations": int(finding.simulations),
         "seconds": _number(outcome.seconds),
         "report": stored((outcome,), made_now()),
+    }
+
+
+def _excitation_json(outcome: DiagnoseOutcome) -> dict[str, Any] | None:
+    """What the validation recordings ask of the model, and what training shows of that."""
+    tested, record = outcome.tested, outcome.determining
+    if tested is None:
+        return None
+    return {
+        "determined": not outcome.undetermined,
+        "tested": {
+            "voltage_kV": _number(tested.voltage / 1e3),
+            "rate_kV_per_s": _number(tested.rate / 1e3),
+            "from_Hz": _number(tested.low),
+            "to_Hz": _number(tested.high),
+        },
+        "records": [
+            {
+                "record": asked.name,
+                "open_over_noise": _number(asked.open_rms),
+                "error_share": _number(asked.share),
+                "error_share_above_training_voltage": _number(asked.above),
+                "not_determined": [
+                    {
+                        "from_Hz": _number(band.low),
+                        "to_Hz": _number(band.high),
+                        "asked_over_noise": _number(band.asked),
+                        "known_pct": _number(100.0 * band.known),
+                    }
+                    for band in asked.undetermined
+                ],
+            }
+            for asked in outcome.excitation
+        ],
+        "parameters_um": [_number(error * 1e6) for error in outcome.prediction_errors],
+        "record": None
+        if record is None
+        else {
+            "name": record.name,
+            "seconds": _number(record.seconds),
+            "open_over_noise": _number(record.open_rms),
+            "sequence": record.sequence,
+        },
     }
 
 

@@ -29,7 +29,7 @@ from dearig.model.fitting.identify import fit_globally, is_worth_freeing
 from dearig.model.fitting.intervals import correlation_time, is_flat
 from dearig.model.fitting.levenberg import LocalFit, descend
 from dearig.model.fitting.parallel import Job, Result, parallel_map
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.search import voltage_starts
 from dearig.model.fitting.slow_noise import (
     DriftSpace,
@@ -42,7 +42,7 @@ from dearig.model.readings.records import ActuatorRecord, Record, counted
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 
-__all__ = ["DRIFT", "Fit", "Fitter", "Work", "fit_of", "with_effect"]
+__all__ = ["DRIFT", "Fit", "Fitter", "Work", "fit_of", "gain_that_ends", "with_effect"]
 
 #: How the marginalised drift is named among the members of a fit.
 DRIFT = "drift"
@@ -290,7 +290,7 @@ class Fitter:
         self, records: Sequence[Record], model: Actuator | Strip, fidelity: int
     ) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
         """Return ``records`` without spikes, and without heavy tails as well."""
-        layout = Layout(model)
+        layout = FitLayout(model)
         x = layout.coordinates(layout.initial())
         whole, normal = [], []
         for record in records:
@@ -322,13 +322,13 @@ class Fitter:
         drift: float = 0.0,
         fidelity: int = kernel.QUICK,
         full: bool = False,
-        layout: Layout | None = None,
+        layout: FitLayout | None = None,
     ) -> WhitenedProblem:
         """Return the records with the numbers of ``model`` free, under a ``drift`` in the noise.
 
         Relaxation times are those of the search unless a ``layout`` is given.
         """
-        layout = layout or Layout(model, self.times if self.of_actuator else None)
+        layout = layout or FitLayout(model, self.times if self.of_actuator else None)
         problem = WhitenedProblem(
             self.full if full else self.records,
             layout,
@@ -345,7 +345,7 @@ class Fitter:
         self.work.add(simulations, effort)
         self.watched()
 
-    def fixed(self, layout: Layout) -> np.ndarray:
+    def fixed(self, layout: FitLayout) -> np.ndarray:
         """Return which parameters (d,) are held: the locking limits, unless the baseline asks.
 
         And the grids of general laws: with weights between their nodes there is nothing to move.
@@ -415,7 +415,7 @@ class Fitter:
         problem = fit.problem
         if problem.fidelity == kernel.ROUGH:
             problem = self.problem(problem.layout.base, fit.drift)
-        gain = _gain(fit, part)
+        gain = gain_that_ends(fit, part)
         found = descend_broyden(problem, fit.x, fit.fixed, None, 40, gain, True)
         found = descend(problem, found.x, fit.fixed, _TO_THE_END, gain, 1e-3, quick=True)
         return fit_of(problem, fit.fixed, found)
@@ -423,11 +423,11 @@ class Fitter:
     def careful(self, fit: Fit, iterations: int) -> Fit:
         """Return ``fit`` on every sample, with careful steps and two-sided differences."""
         problem = self.careful_problem(fit.model, fit.drift)
-        found = descend(problem, fit.x, fit.fixed, iterations, _gain(fit), damping=1e-4)
+        found = descend(problem, fit.x, fit.fixed, iterations, gain_that_ends(fit), damping=1e-4)
         return fit_of(problem, fit.fixed, found)
 
     def careful_problem(
-        self, model: Actuator | Strip, drift: float, layout: Layout | None = None
+        self, model: Actuator | Strip, drift: float, layout: FitLayout | None = None
     ) -> WhitenedProblem:
         """Return every sample with careful steps; ``drift`` is that of the thinned records."""
         # its variance is in units of one reading's noise, which thinning has lowered
@@ -502,7 +502,7 @@ class Fitter:
         fits = [self.careful(baseline, iterations)]
         if not self.of_actuator:
             return fits[0]
-        layout = Layout(baseline.model)
+        layout = FitLayout(baseline.model)
         problem = self.problem(baseline.model, layout=layout)
         own = baseline.problem.layout.values(baseline.x)
         # the shortest branch as a drag: modulus times relaxation time is what slow motion shows
@@ -519,7 +519,7 @@ class Fitter:
             ),
         ]
         best = min(wide, key=lambda f: f.cost)
-        fixed, gain = best.fixed, _gain(best, REPORTED_TOLERANCE)
+        fixed, gain = best.fixed, gain_that_ends(best, REPORTED_TOLERANCE)
         found = descend(problem, best.x, fixed, _BASELINE_ITERATIONS, gain, 1e-4, quick=True)
         none = np.zeros_like(fixed)
         freed = descend(problem, found.x, none, _BASELINE_ITERATIONS, gain, quick=True)
@@ -554,7 +554,7 @@ class Fitter:
         return fit_of(problem, fixed, found)
 
 
-def _gain(fit: Fit, part: float = _GAIN_PART) -> float:
+def gain_that_ends(fit: Fit, part: float = _GAIN_PART) -> float:
     """Return the gain of chi-square below which a descent from ``fit`` has ended.
 
     Where much more than noise is left, it is a ``part`` of that.

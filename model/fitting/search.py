@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb, inf
@@ -15,10 +15,10 @@ from dearig.model.coefficients import ELECTRIC, MODULUS
 from dearig.model.errors import ModelError
 from dearig.model.film.material import Branch, Network, Spring
 from dearig.model.film.network import HEAD
-from dearig.model.fitting.parameters import THESIS_RANGES, Layout
+from dearig.model.fitting.parameters import THESIS_RANGES, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.kinematics import electric_along
-from dearig.model.readings.records import ActuatorRecord, FilmRecord
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import unit_stresses
 from dearig.model.springs import SPRING_LAWS
@@ -29,6 +29,7 @@ __all__ = [
     "Algorithm1",
     "algorithm_1",
     "film_starts",
+    "resolved_times",
     "voltage_starts",
 ]
 
@@ -132,7 +133,7 @@ def _actuator(problem: Problem) -> Actuator:
     return base
 
 
-def _start_values(layout: Layout) -> np.ndarray:
+def _start_values(layout: FitLayout) -> np.ndarray:
     """Return natural start values (d,) at which no spring stiffens."""
     values = layout.initial()
     values[layout.column("J")] = _WIDE_LIMIT
@@ -142,7 +143,7 @@ def _start_values(layout: Layout) -> np.ndarray:
     return values
 
 
-def _wide(layout: Layout) -> tuple[float, ...]:
+def _wide(layout: FitLayout) -> tuple[float, ...]:
     """Return the values at which the equilibrium spring does not stiffen."""
     return _shape_values(layout.network.equilibrium.kind, _WIDE_LIMIT)
 
@@ -251,12 +252,20 @@ def film_starts(
     return _ranked(layout, found, starts)
 
 
+def resolved_times(records: Sequence[Record]) -> tuple[float, float]:
+    """Return the least and largest relaxation time in s that ``records`` resolve.
+
+    Two samples, and three durations.
+    """
+    shortest = min(float(np.median(np.diff(r.time))) for r in records)
+    longest = max(float(r.time[-1] - r.time[0]) for r in records)
+    return 2.0 * shortest, 3.0 * longest
+
+
 def _time_grid(problem: Problem, points: int = 16) -> np.ndarray:
-    """Return relaxation times that records resolve, two samples to three durations, in bounds."""
+    """Return relaxation times that records resolve, in bounds."""
     layout = problem.layout
-    shortest = min(float(np.median(np.diff(r.time))) for r in problem.records)
-    longest = max(float(r.time[-1] - r.time[0]) for r in problem.records)
-    first, last = 2.0 * shortest, 3.0 * longest
+    first, last = resolved_times(problem.records)
     times = layout.column("T")
     if times.size:
         low, high = np.exp(layout.lower[times].min()), np.exp(layout.upper[times].max())
@@ -287,7 +296,7 @@ def _unit_stresses(
 
 
 def _subsets(
-    layout: Layout,
+    layout: FitLayout,
     first: tuple[float, ...],
     candidates: np.ndarray,
     parts: np.ndarray,
@@ -329,7 +338,7 @@ def _subsets(
     return found
 
 
-def _ranked(layout: Layout, found: list[tuple[float, np.ndarray]], starts: int) -> np.ndarray:
+def _ranked(layout: FitLayout, found: list[tuple[float, np.ndarray]], starts: int) -> np.ndarray:
     """Return the best starts (K, d) that differ in a relaxation time or limit."""
     if not found:
         raise ModelError(
