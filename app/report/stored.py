@@ -257,13 +257,13 @@ def _hints(kind: type) -> dict[str, Any]:
     """Return the annotations of ``kind``, with those names that only a type checker imports."""
     from dearig.config import modelfile
     from dearig.model import fitting, residual
-    from dearig.model.diagnosis import events, results
+    from dearig.model.diagnosis import events, excitation, results
     from dearig.model.readings import measures
     from dearig.recording.reading import early_end, origin
 
     names: dict[str, Any] = {}
     for module in (
-        modelfile, fitting, residual, events, results, measures, early_end, origin
+        modelfile, fitting, residual, events, excitation, results, measures, early_end, origin
     ):  # fmt: skip
         names |= vars(module)
     return typing.get_type_hints(kind, localns=names)

@@ -6,14 +6,15 @@ import base64
 import json
 import re
 import zlib
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
+from typing import get_args
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from dearig.analysis.outcomes import DiagnoseOutcome, IdentifyOutcome
+from dearig.analysis.outcomes import DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
 from dearig.errors import InputError
 from dearig.model.effects import EFFECTS
 from dearig.recording.json_file import write_json
@@ -26,7 +27,7 @@ from dearig.report.pages.head import head_of
 from dearig.report.pages.html import write_demo_report, write_identify_report
 from dearig.report.pages.laws import law_view
 from dearig.report.pages.seal import check_page
-from dearig.report.stored import restored, stored
+from dearig.report.stored import _hints, restored, stored
 from dearig.report.text import citation
 from tests.tools.command import dearig, done, refused
 from tests.tools.diagnosis import diagnose_outcome, film_diagnosis
@@ -99,6 +100,25 @@ def test_arrays_and_odd_numbers_come_back_bit_by_bit() -> None:
     assert back.model.model == model.model
     assert back.fit.estimates == outcome.fit.estimates  # some intervals end at infinity
     assert found.made == MADE
+
+
+def test_every_type_in_an_outcome_is_known() -> None:
+    """A field of a new type is added with the module that has it."""
+    seen: set[object] = set()
+
+    def look(hint: object) -> None:
+        if hint in seen:
+            return
+        seen.add(hint)
+        for part in get_args(hint):
+            look(part)
+        if is_dataclass(hint):
+            for field in fields(hint):
+                look(_hints(hint)[field.name])
+
+    for kind in (IdentifyOutcome, ValidateOutcome, DiagnoseOutcome):
+        look(kind)
+    assert sum(map(is_dataclass, seen)) > 30
 
 
 # ---------------------------------------------------------------- what no program wrote
