@@ -70,7 +70,7 @@ class ChannelEvidence:
     """Evidence of the electrical ``channels``, relative to the plain film's circuit.
 
     Of each channel C = n ln((c + delta^2 (c0 - c))/c0), with the mean square c of its residual over
-    the noise, c0 that of the plain circuit and n independent means: (11).
+    the noise, c0 that of the plain circuit and n independent means: (12).
     """
 
     def __init__(self, channels: Channels, settings: DiagnosisSettings, plain: Actuator) -> None:
@@ -78,6 +78,11 @@ class ChannelEvidence:
         self._plain = replace(plain, effects=())
         self.plain = channels.misfits(self._plain)
         self._known: dict[EffectValues, dict[str, float]] = {}
+
+    def see(self, model: Actuator) -> None:
+        """Take account of what ``model`` leaves of the channels in the weight that they have."""
+        if self._channels.see(self._electric(model)):
+            self._known.clear()
 
     def of(self, model: Actuator) -> dict[str, float]:
         """Return C of ``model`` by channel; 0 for the plain circuit."""

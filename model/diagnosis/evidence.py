@@ -4,7 +4,7 @@
 
 c is the mean square of the whitened residuals over the noise, c0 that of the baseline, k the number
 of fitted parameters. No law is true to more than delta of what it explains. Electrical channels add
-a term each, (11). n counts independent samples: the readings over the least correlation time of any
+a term each, (12). n counts independent samples: the readings over the least correlation time of any
 fit so far, one n for the whole diagnosis. (Schwarz, Annals of Statistics 6, 461 (1978); the scale
 of the noise is marginalised.)
 Numbers of equations are those of ``app/docs/explanation/diagnosis.md``.
@@ -83,6 +83,8 @@ class Judge:
         """Take account of the correlation times of ``fits``."""
         for fit in fits:
             self._correlation = max(1.0, min(self._correlation, fit.correlation))
+            if self.channels and isinstance(fit.model, Actuator):
+                self.channels.see(fit.model)
 
     @property
     def samples(self) -> float:

@@ -5,7 +5,7 @@ changes is computed on means at 200 Hz, and added to what the plain film's circu
 sample: without an effect the prediction is that of the plain circuit, exactly. Each channel has
 unknowns of its own that enter linearly and are eliminated in every prediction:
 
-    y = g p + o + C_s s + G d                                                              (10)
+    y = g p + o + C_s s + G d                                                              (11)
 
 p is the predicted reading, g its gain, 1 within the uncertainty of the channel's scale, and o its
 offset. Of the current, s = (Z/z)^2 dU/dt is what a jump of the output leaves at the instant of a
@@ -59,7 +59,7 @@ _FINEST = 2e-4  # s: faster held outputs are taken as lines, late by half a samp
 _REST_MIN = 100  # means at rest: fewer give the noise to worse than 7 %
 _KNOWN = 1.0 / 6.0  # of the gain: 3 standard errors below half
 _SCALE = 0.2  # of the gain of a voltage monitor: no amplifier loses as much
-_SHOWS = 25.0  # of chi-square: five standard deviations
+_SHOWS = 25.0  # of chi-square, above that of as many numbers: five standard deviations
 _FUNCTIONS = 7  # of the voltage, that stand for any effect: five powers and two differences
 _KEPT = 256  # predictions that are kept
 
@@ -189,12 +189,20 @@ class _Channel:
         # the charging that laws of leakage neglect takes less than a mean: else it was a lag
         self._least = circuit.c[CAPACITANCE] / (circuit.step * circuit.every)
         self.reason = self._assess()
-        self.correlation, self.least, self.floor = 1.0, 1.0, 1.0
+        self.correlation, self.least = 1.0, math.inf
         if not self.reason:
-            left = self._flexible(shapes=True)[2]
-            self.correlation = max(1.0, correlation_time(left))
-            self.least = float(np.mean(left**2))
-            self.floor = max(1.0, self.least)
+            self.see(self._flexible(shapes=True)[2])
+
+    def see(self, residual: np.ndarray) -> bool:
+        """Take account of a ``residual`` (N,) in noises, if it is the least so far.
+
+        What no model explains is noise: its size and its correlation lower the channel's weight.
+        """
+        cost = float(np.mean(residual**2))
+        if not cost < self.least:
+            return False
+        self.least, self.correlation = cost, max(1.0, correlation_time(residual))
+        return True
 
     @property
     def samples(self) -> float:
@@ -238,19 +246,18 @@ class _Channel:
     def _flexible(self, shapes: bool) -> tuple[float, float, np.ndarray, float]:
         """Return gain and its error of a regression that knows no effect; its residual; its gain.
 
-        Powers of the output stand for what leaks or saturates, with ``shapes`` its second
-        difference for what is late. The last value is what the powers take off chi-square.
+        Powers of the output stand for what leaks or saturates, with ``shapes`` its differences for
+        what is late. The last value is what all but a constant takes off chi-square.
         """
         circuit = self.circuit
         plain, output = circuit.plain[self._row], circuit.plain[loop.OUTPUT]
         largest = float(np.abs(output).max()) or 1.0
         u = output / largest
-        columns = [plain, np.ones_like(plain)]
+        columns = [np.ones_like(plain), plain]
         if self.name == CURRENT:
             columns.append(circuit.area_slope)
         if shapes:
             columns += [np.gradient(u), np.gradient(np.gradient(u))]
-        few = len(columns)
         powers = [u, u * np.abs(u), u**3, u**3 * np.abs(u), u**5]
         columns += powers[1:] if self.name == VOLTAGE_MONITOR else powers
         matrix = np.transpose(columns) / self.noise
@@ -259,9 +266,9 @@ class _Channel:
         target = self.y / self.noise
         inside = q.T @ target
         inverse = np.linalg.pinv(r)
-        gain = float((inverse @ inside)[0] / scale[0])
-        error = float(np.linalg.norm(inverse[0]) / scale[0])
-        return gain, error, target - q @ inside, float(np.sum(inside[few:] ** 2))
+        gain = float((inverse @ inside)[1] / scale[1])
+        error = float(np.linalg.norm(inverse[1]) / scale[1])
+        return gain, error, target - q @ inside, float(np.sum(inside[1:] ** 2))
 
     def _assess(self) -> str:
         """Return why the channel cannot be used, "" where it can."""
@@ -277,18 +284,14 @@ class _Channel:
             if abs(gain - 1.0) > _SCALE:
                 return f"reads {gain:.3g} times the command: its scale is wrong"
             return ""
-        gain, error, left, leaks = self._flexible(shapes=False)
-        error *= math.sqrt(max(1.0, float(np.mean(left**2))))
-        if error > _KNOWN:
-            if leaks > _SHOWS * max(1.0, float(np.mean(left**2))):
-                return ""
-            return (
-                "too noisy to show how the film charges as it moves: a wire that is off would "
-                "read the same"
-            )
-        if abs(gain) < 0.5 and abs(gain) < 3.0 * error:
+        gain, error, left, shown = self._flexible(shapes=False)
+        above = max(1.0, float(np.mean(left**2)))
+        error *= math.sqrt(above)
+        if shown < (_SHOWS + 2 * _FUNCTIONS) * above:
+            if error > _KNOWN:
+                return "too noisy to show the film's current: a wire that is off reads the same"
             return "does not show how the film charges as it moves: not wired, or of another signal"
-        if gain + 3.0 * error < 0.5 or gain - 3.0 * error > 2.0:
+        if error < _KNOWN and (gain + 3.0 * error < 0.5 or gain - 3.0 * error > 2.0):
             return f"reads {gain:.3g} times the film's current: its scale is wrong"
         return ""
 
@@ -358,10 +361,16 @@ class Channels:
         """
         return np.concatenate(
             [
-                -r / math.sqrt(x.correlation * x.floor)
+                -r / math.sqrt(x.correlation * max(1.0, x.least))
                 for x, r in zip(self._channels, self._residuals(c), strict=True)
             ]
         )
+
+    def see(self, model: Actuator) -> bool:
+        """Take account of what ``model`` leaves; True where it is less than anything before."""
+        found = self._residuals(model.coefficients())
+        less = [x.see(r[:-1]) for x, r in zip(self._channels, found, strict=True)]
+        return any(less)
 
     def misfits(self, model: Actuator) -> dict[str, ChannelMisfit]:
         """Return what ``model`` leaves of each channel that is used."""
