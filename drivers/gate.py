@@ -35,11 +35,11 @@ from dearig.drivers.samples import Computed, Listed, Repeated, Samples
 
 __all__ = [
     "BlockGate",
+    "FilmForecast",
     "FilmPrediction",
     "GatedWaveform",
     "Limits",
     "Margin",
-    "Prediction",
     "admit",
     "open_block_gate",
     "ramp_down",
@@ -86,7 +86,7 @@ class FilmPrediction(Protocol):
 
 
 @dataclass(frozen=True)
-class Prediction:
+class FilmForecast:
     """Prediction of the film that was made before; see ``FilmPrediction``.
 
     ``field_per_volt`` (M,) 1/m has one number for each ``stride`` of the waveform's N samples,

@@ -9,14 +9,14 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-__all__ = ["ContractError", "Registry"]
+__all__ = ["EntryError", "Registry"]
 
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
 
-class ContractError(AssertionError):
+class EntryError(AssertionError):
     """An entry of a registry does not do what every entry must do: which one, where, and how."""
 
 

@@ -54,10 +54,11 @@ class Judgement:
 
     ``reasons`` are of: ``training`` (the error of a training recording is above its noise),
     ``selection`` (the cross-validation error rises with what was added), ``validation`` (the error
-    of a validation recording is above its noise), ``rest`` (nothing was found, but the readings at
-    rest move slowly, and count as noise), ``stopped`` (nothing is missing so far, but not
-    everything was tried) and ``prediction`` (validation recordings above their noise are not
-    predicted better with what was found than without it).
+    of a validation recording is above its noise), ``excitation`` (all of that is where the training
+    recordings determine nothing: edges, levels or rests that they do not have), ``rest`` (nothing
+    was found, but the readings at rest move slowly, and count as noise), ``stopped`` (nothing is
+    missing so far, but not everything was tried) and ``prediction`` (validation recordings above
+    their noise are not predicted better with what was found than without it).
     """
 
     verdict: str
@@ -72,6 +73,7 @@ def judge(
     selection: tuple[float, float],
     moves_at_rest: bool = False,
     gain: float | None = None,
+    undetermined: bool = False,
 ) -> Judgement:
     """Return the verdict that the numbers support, which is never more than ``found``.
 
@@ -82,7 +84,8 @@ def judge(
     cross-validation error over the noise, with the baseline and with the final model. With
     ``moves_at_rest`` the noise at rest of a training recording is mostly slow motion. ``gain`` is
     twice the logarithm of how much more probable the validation recordings are with the effects
-    that were found, None where none was found or nothing validates it.
+    that were found, None where none was found or nothing validates it. ``undetermined`` says that
+    each validation recording above its noise asks for what the training recordings do not show.
     """
     beyond = any(error > TOLERANCE for error in validation)
     if found in (EXPLAINED, PARTLY_EXPLAINED) and gain is not None and gain < CONFIRMING and beyond:
@@ -94,6 +97,7 @@ def judge(
         "training": any(error > TOLERANCE for error in training),
         "selection": found == EXPLAINED and after > before and after > TOLERANCE,
         "validation": beyond,
+        "excitation": beyond and undetermined,
         "rest": found == NOTHING_MISSING and moves_at_rest,
         "stopped": found == NOTHING_MISSING and status == STOPPED,
     }

@@ -9,13 +9,13 @@ from dearig.drivers.errors import RigError
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.streams import Streams
 
-__all__ = ["INPUT_OVERWRITTEN", "Card"]
+__all__ = ["INPUT_OVERWRITTEN", "Converters"]
 
 INPUT_OVERWRITTEN = -200279  #: DAQmx: samples were overwritten before they were read
 RATE_TOO_HIGH = -200077  #: DAQmx: a requested value is not supported
 
 
-class Card:
+class Converters:
     """Card of a rig with ``settings``; its calibration is drawn once from ``streams``."""
 
     def __init__(self, settings: RigSettings, streams: Streams) -> None:

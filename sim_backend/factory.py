@@ -14,13 +14,14 @@ from dearig.model.film.material import TABLE_3, Film, Load
 from dearig.model.simulation.actuator import Actuator
 from dearig.sim_backend.clock import Clock, ManualClock, PacedClock
 from dearig.sim_backend.faults import FaultPlan
+from dearig.sim_backend.inputs import SimulatedInputs
 from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.model_plant import ModelPlant
 from dearig.sim_backend.plant import Plant
 from dearig.sim_backend.rig import SimulatedRig
 from dearig.sim_backend.truth import cases
 
-__all__ = ["open_simulated_rig", "plant_of"]
+__all__ = ["open_simulated_inputs", "open_simulated_rig", "plant_of"]
 
 
 def open_simulated_rig(
@@ -60,6 +61,29 @@ def open_simulated_rig(
         identity_seed=hidden,
         block_samples=block_samples,
         faults=faults,
+        noise=WHITE if case is None else case.noise,
+    )
+
+
+def open_simulated_inputs(
+    address: str,
+    settings: RigSettings,
+    film: Film,
+    load: Load,
+    *,
+    actuator: Actuator | None = None,
+    clock: Clock | None = None,
+) -> SimulatedInputs:
+    """Open the inputs of the rig at ``address`` at rest, in real time unless ``clock`` is given.
+
+    Raises as ``open_simulated_rig``.
+    """
+    plant, case = _plant_and_case(address, film, load, actuator)
+    return SimulatedInputs(
+        settings,
+        plant,
+        clock or PacedClock(),
+        noise_seed=(0,) if case is None else (0, case.seed),
         noise=WHITE if case is None else case.noise,
     )
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from dearig.drivers.channels import Channel
 from dearig.drivers.errors import RigError
-from dearig.drivers.gate import Prediction, admit
+from dearig.drivers.gate import FilmForecast, admit
+from dearig.drivers.inputs import Inputs
 from dearig.drivers.instruments.amplifier import Monitors
 from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.instruments.laser import LaserDriver, LaserInspection
@@ -26,7 +27,7 @@ from dearig.drivers.rig import Rig, RigIdentity
 from dearig.drivers.rig_kind import RigOptions
 from dearig.drivers.settings import LaserSettings, RigSettings
 from dearig.model.film.material import Film
-from dearig.sim_backend.factory import open_simulated_rig
+from dearig.sim_backend.factory import open_simulated_inputs, open_simulated_rig
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.keyence import SimulatedController
 from dearig.sim_backend.room import SimulatedSource, air_of_run
@@ -50,6 +51,12 @@ class SimulatedKind:
             address, settings, options.film, options.load, seed=options.seed, paced=options.paced,
             actuator=options.actuator, faults=options.faults,
         )  # fmt: skip
+
+    def open_inputs(self, address: str, settings: RigSettings, options: RigOptions) -> Inputs:
+        """Return the inputs of the rig at ``address`` at rest; raises as ``open``."""
+        return open_simulated_inputs(
+            address, settings, options.film, options.load, actuator=options.actuator
+        )
 
     def inspect(
         self, address: str, settings: RigSettings, options: RigOptions
@@ -145,7 +152,7 @@ def _at_zero(
     rate = float(settings.card.sample_rate_Hz)
     zero = np.zeros(max(_SAMPLES_MIN, round(_SECONDS * rate)))
     # any film's limits admit 0 V
-    prediction = Prediction(np.full(zero.size, 1.0 / film.thickness), film.electric_volume)
+    prediction = FilmForecast(np.full(zero.size, 1.0 / film.thickness), film.electric_volume)
     rate = rig.load(admit(zero, rate, limits, prediction))
     rig.arm()
     rig.start()

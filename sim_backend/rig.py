@@ -15,7 +15,7 @@ from dearig.drivers.identity import instruments
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState
 from dearig.drivers.settings import RigSettings
 from dearig.drivers.zero_reading import ZeroReading
-from dearig.sim_backend.card import INPUT_OVERWRITTEN, Card
+from dearig.sim_backend.card import INPUT_OVERWRITTEN, Converters
 from dearig.sim_backend.clock import Clock
 from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
 from dearig.sim_backend.laser_noise import WHITE
@@ -150,7 +150,7 @@ class SimulatedRig:
         self._identity_seed = identity_seed
         self._block_samples = block_samples
         self._streams = Streams(noise_seed)
-        self._card = Card(settings, self._streams)
+        self._card = Converters(settings, self._streams)
         self._lock = threading.RLock()
         self._wake = threading.Event()
         self._state = RigState.SAFE

@@ -12,7 +12,7 @@ from dearig.drivers.channels import HUMIDITY
 from dearig.drivers.rig import Event
 from dearig.drivers.settings import RigSettings, ThermometerSettings
 from dearig.sim_backend.amplifier import Amplifier, AmplifierRows, AmplifierState
-from dearig.sim_backend.card import Card
+from dearig.sim_backend.card import Converters
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.laser import Laser, LaserRows, LaserState
 from dearig.sim_backend.laser_noise import WHITE
@@ -62,7 +62,7 @@ class SignalPath:
     def __init__(
         self,
         settings: RigSettings,
-        card: Card,
+        card: Converters,
         streams: Streams,
         run: int,
         rate: float,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from dearig.recording import open_recording
+from tests.test_revision import git
 from tests.tools.command import LOBE, SLOW_RIG, write
 
 ROOT = Path(__file__).parents[1]
@@ -53,8 +55,11 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copytree(
             ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__")
         )
-    for name in ("pyproject.toml", PROJECT["project"]["readme"], "LICENSE"):
+    for name in ("pyproject.toml", "setup.py", PROJECT["project"]["readme"], "LICENSE"):
         shutil.copy(ROOT / name, source / name)
+    git(source, "init", "-q")
+    git(source, "add", ".")
+    git(source, "commit", "-q", "-m", "Release")
     built = subprocess.run(
         [
             sys.executable, "-P", "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index",
@@ -77,7 +82,7 @@ def test_the_wheel_has_one_top_level_name_and_every_file(wheel: Path) -> None:
         for folder, name in FOLDERS.items()
         for path in files_in(ROOT / folder)
     }
-    assert packed == expected
+    assert packed == expected | {"dearig/revision.json"}
     assert "dearig/py.typed" in packed
     for ending in (".j2", ".png", ".md"):
         assert any(name.endswith(ending) for name in packed), ending
@@ -115,6 +120,14 @@ def folder(tmp_path: Path) -> Path:
     write(tmp_path / "lobe.toml", LOBE)
     write(tmp_path / "rig.toml", SLOW_RIG + '[film]\nname = "F 3"\n')
     return tmp_path
+
+
+def test_the_installed_program_names_the_revision_of_its_build(
+    installed: Path, folder: Path
+) -> None:
+    said = run(folder, installed, "-m", "dearig", "--version").stdout
+    version = re.escape(PROJECT["project"]["version"])
+    assert re.fullmatch(rf"dearig {version}, revision [0-9a-f]{{40}}\n", said), said
 
 
 def environment(tmp_path: Path) -> dict[str, str]:

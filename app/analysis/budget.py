@@ -11,7 +11,7 @@ from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.fitting import GivenValue, uncertainty_budget, with_systematic
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress
@@ -69,7 +69,7 @@ def diagnosis_with_budget(
     model = final.of_each(len(records))[0]
     if finding.interrupted or not given or not isinstance(model, Actuator):
         return finding
-    held = ~np.isin(Layout(model).names, final.covariance_names)
+    held = ~np.isin(FitLayout(model).names, final.covariance_names)
     budget = uncertainty_budget(
         records, model, held, given,
         # the bar is of the whole work, which the search has filled

@@ -13,7 +13,7 @@ from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.budget import diagnosis_with_budget, given_values
 from dearig.analysis.cores import for_simulations
-from dearig.analysis.experiment import experiment_of
+from dearig.analysis.experiment import experiment_of, prediction_errors, with_excitation
 from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
@@ -50,10 +50,9 @@ from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
 from dearig.model.fitting import GivenValue
-from dearig.model.fitting.prediction import prediction_error, prediction_gain
+from dearig.model.fitting.prediction import prediction_gain
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
-from dearig.model.verdict import NOTHING_MISSING
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
 from dearig.recording.reading.recording import Recording
@@ -426,29 +425,17 @@ def _outcome(
         few_data=few_data(fitted),
         assumed=assumed_by(recordings, settings.rig_file),
         not_compared=tuple(r.name for r in others if r.name not in compared),
-        prediction_errors=_prediction_errors([r for r in others if r.name in compared], finding),
+        prediction_errors=prediction_errors(
+            [r for r in others if r.name in compared], finding.final
+        ),
         gain=_gain(stands, own, noise) if finding.steps else None,
     )
+    outcome = with_excitation(outcome, settings.rig)
     if not outcome.recommends_final:
         plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)
         outcome = replace(outcome, model=plain)
     history = _history(outcome, recordings)
     return replace(outcome, model=replace(outcome.model, history=history))
-
-
-@for_simulations()
-def _prediction_errors(readings: Sequence[Readings], finding: Diagnosis) -> tuple[float, ...]:
-    """Return what the parameters' own error may make of each of ``readings``, in m or Pa.
-
-    () where an effect was found, or the parameters have no covariance: it is not asked for.
-    """
-    final = finding.final
-    if finding.verdict != NOTHING_MISSING or not final.covariance_names:
-        return ()
-    return tuple(
-        prediction_error(each.record, final.predicting, final.covariance_names, final.covariance)
-        for each in readings
-    )
 
 
 def _title(recordings: Sequence[Recording]) -> str:

@@ -1,10 +1,11 @@
-"""The excitation that separates rival models best within the limits of a rig."""
+"""Excitation within the limits of a rig: what separates rivals, and what training lacks."""
 
 from __future__ import annotations
 
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,15 @@ import tomli_w
 
 from dearig.acquisition.plan import Plan, plan
 from dearig.acquisition.prediction import peaks_of
-from dearig.analysis.outcomes import SeparatingExperiment
+from dearig.analysis.cores import for_simulations
+from dearig.analysis.outcomes import (
+    Comparison,
+    DeterminingRecord,
+    DiagnoseOutcome,
+    SeparatingExperiment,
+)
 from dearig.analysis.readings.compatibility import of_rig
+from dearig.analysis.readings.record import Readings
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
@@ -23,12 +31,22 @@ from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.interlocks import would_trip
 from dearig.drivers.samples import Repeated
 from dearig.errors import InputError
-from dearig.model.diagnosis.results import Diagnosis
+from dearig.model.diagnosis.excitation import Excitation, Motion, excitation, range_of
+from dearig.model.diagnosis.results import Diagnosis, Stage
+from dearig.model.fitting.prediction import prediction_error
 from dearig.model.kernel import OK
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import THESIS_AMPLITUDES
 
-__all__ = ["SEPARATES", "candidates", "experiment_of", "separating_experiment"]
+__all__ = [
+    "SEPARATES",
+    "candidates",
+    "determining_record",
+    "experiment_of",
+    "prediction_errors",
+    "separating_experiment",
+    "with_excitation",
+]
 
 #: RMS difference of two predictions, in noise floors, from which an experiment separates them.
 SEPARATES = 0.5
@@ -110,10 +128,8 @@ def separating_experiment(
     """
     labels = tuple(label for label, _, _ in rivals)
     families = tuple(dict.fromkeys(family for _, family, _ in rivals))
-    # the rig's limit, and at most the voltage of the thesis's experiments
-    top = math.floor(min(rig_file.gate_limits().voltage_max / 1e3, 8.0) * 1e3) / 1e3
     made: list[tuple[str, dict[tuple[str, str], float], float, str]] = []
-    for name, text in candidates(top).items():
+    for name, text in candidates(_top_kV(rig_file)).items():
         playable = _playable(text, name, rivals, rig_file, noise)
         if playable is None:
             continue
@@ -160,6 +176,35 @@ def separating_experiment(
         f"excitations within the rig's limits: the predictions of any two differ by at least "
         f"{separation:.2g} times the noise{but}"
     )
+
+
+def determining_record(
+    model: Actuator, asked: Sequence[Excitation], rig_file: RigFile, noise: float
+) -> DeterminingRecord | None:
+    """Return the shortest sequence that shows what is ``asked``, None where none does.
+
+    With its recording, every band of ``asked`` would be determined, if the film does what ``model``
+    predicts. ``noise`` is the floor of one reading in m. The sequence passes the gate of
+    ``rig_file`` and trips no interlock.
+    """
+    rig_file = of_rig(rig_file, model.film, model.load)
+    found: list[DeterminingRecord] = []
+    for name, text in candidates(_top_kV(rig_file)).items():
+        playable = _playable(text, name, [("", "", model)], rig_file, noise)
+        if playable is None:
+            continue
+        loaded, waveform, (moved,) = playable
+        motion = Motion(name, waveform.duration / moved.size, np.zeros(1), moved, noise)
+        left = [each.after(motion) for each in asked]
+        if not any(each.undetermined for each in left):
+            worst = max(each.open_rms for each in left)
+            found.append(DeterminingRecord(name, loaded.toml, waveform.duration, worst))
+    return min(found, key=lambda record: record.seconds, default=None)
+
+
+def _top_kV(rig_file: RigFile) -> float:  # noqa: N802
+    """Return the rig's limit, and at most the voltage of the thesis's experiments."""
+    return math.floor(min(rig_file.gate_limits().voltage_max / 1e3, 8.0) * 1e3) / 1e3
 
 
 def _playable(
@@ -276,3 +321,53 @@ def experiment_of(
             label = " with ".join(name for name, _ in model.effects) or "the baseline"
             rivals.append((label, family_of, model))
     return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)
+
+
+@for_simulations()
+def prediction_errors(readings: Sequence[Readings], final: Stage) -> tuple[float, ...]:
+    """Return what the parameters' own error may make of each of ``readings``, in m or Pa.
+
+    () where the parameters have no covariance.
+    """
+    if not final.covariance_names:
+        return ()
+    return tuple(
+        prediction_error(each.record, final.predicting, final.covariance_names, final.covariance)
+        for each in readings
+    )
+
+
+def with_excitation(outcome: DiagnoseOutcome, rig_file: RigFile) -> DiagnoseOutcome:
+    """Return ``outcome`` with what its validation recordings ask of the model that is judged.
+
+    Where the training recordings do not determine that, it has the shortest sequence within the
+    limits of ``rig_file`` that would. Films are driven by no sequence, and stay as they are.
+    """
+    after, model = outcome.after, outcome.finding.final.predicting
+    if outcome.kind == "film" or not after.validation or not isinstance(model, Actuator):
+        return outcome
+    fitted = [_motion(c, outcome.noise) for c in after.train]
+    asked = [_motion(c, outcome.noise) for c in after.validation]
+    found = replace(
+        outcome,
+        excitation=tuple(
+            excitation(fitted, motion, c.measured - c.model)
+            for motion, c in zip(asked, after.validation, strict=True)
+        ),
+        tested=range_of(asked),
+    )
+    if not found.undetermined:
+        return found
+    record = determining_record(model, found.undetermined, rig_file, outcome.noise)
+    return replace(found, determining=record)
+
+
+def _motion(comparison: Comparison, noise: float) -> Motion:
+    step: Any = np.median(np.diff(comparison.time))
+    return Motion(
+        comparison.name,
+        float(step),
+        np.nan_to_num(comparison.drive),
+        comparison.model,
+        max(comparison.noise or 0.0, noise),
+    )

@@ -14,7 +14,7 @@ from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.importers import Imported, ImportOptions, import_file
 from dearig.recording.importers.importing import WRITING, prepare
 from dearig.recording.importers.listing import Content, content_of
-from dearig.recording.importers.quantities.units import Scale
+from dearig.recording.importers.quantities.units import UnitScale
 
 __all__ = ["ImportTrial", "preview_file", "try_import", "write_import"]
 
@@ -38,7 +38,7 @@ class ImportTrial:
 def preview_file(
     path: Path,
     names_line: int | None,
-    raw: Mapping[str, Scale],
+    raw: Mapping[str, UnitScale],
     progress: Progress = quiet,
 ) -> Content:
     """Return the content of the file at ``path``. Raises ``InputError``."""

@@ -18,6 +18,7 @@ from dearig.model.verdict import (
     NOTHING_MISSING,
     PARTLY_EXPLAINED,
     STOPPED,
+    TOLERANCE,
     UNEXPLAINED,
     Judgement,
     judge,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
     from dearig.config.modelfile import ModelFile
     from dearig.model.diagnosis.events import OneTimeEvent
+    from dearig.model.diagnosis.excitation import Excitation, Tested
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Contribution, Identification
     from dearig.model.fitting.channels import ChannelResult
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BranchTrial",
     "Comparison",
+    "DeterminingRecord",
     "DiagnoseOutcome",
     "Evaluation",
     "IdentifyOutcome",
@@ -275,6 +278,19 @@ class SeparatingExperiment:
 
 
 @dataclass(frozen=True)
+class DeterminingRecord:
+    """The shortest sequence that would show what the validation recordings ask for.
+
+    With it, the training recordings would leave no more open than ``open_rms`` noises.
+    """
+
+    name: str
+    sequence: str
+    seconds: float
+    open_rms: float
+
+
+@dataclass(frozen=True)
 class DiagnoseOutcome:
     """A finished (or interrupted) diagnosis, with its errors on training and validation recordings.
 
@@ -292,7 +308,10 @@ class DiagnoseOutcome:
     bound), () where that is not known. ``gain`` is twice the logarithm of the odds that the
     validation recordings give to what was found, without what happened in one of them alone: None
     where nothing was found or nothing validates it, minus infinity where the final model cannot
-    follow one of them. ``seconds`` is the computing time.
+    follow one of them. ``excitation`` is what each validation recording asks beyond the training
+    recordings, ``tested`` how far all of them test the model (() and None of films);
+    ``determining`` would show what is not determined, None where nothing asks for it or no sequence
+    does. ``seconds`` is the computing time.
     """
 
     title: str
@@ -315,6 +334,9 @@ class DiagnoseOutcome:
     assumed: str = ""
     prediction_errors: tuple[float, ...] = ()
     gain: float | None = None
+    excitation: tuple[Excitation, ...] = ()
+    tested: Tested | None = None
+    determining: DeterminingRecord | None = None
 
     @property
     def status(self) -> str:
@@ -386,6 +408,33 @@ class DiagnoseOutcome:
         found["unknown"] = found.get("unknown", 0.0) + left
         return tuple(sorted(found.items(), key=lambda item: -item[1]))
 
+    @property
+    def _within_parameters(self) -> list[float]:
+        """The errors on validation over the noise and the parameters' own error in prediction."""
+        return [
+            c.over_noise(self.noise) / math.hypot(1.0, own / self.noise)
+            for c, own in zip(self.after.validation, self.prediction_errors, strict=True)
+        ]
+
+    @property
+    def undetermined(self) -> tuple[Excitation, ...]:
+        """What validation recordings above their noise ask, if the training recordings lack it.
+
+        () unless that explains each of them: the error lies where training shows too little, or is
+        within what the uncertainty of the fitted parameters allows.
+        """
+        own = self._within_parameters if self.prediction_errors else ()
+        beyond = [
+            (asked, bool(own) and own[i] <= TOLERANCE)
+            for i, (c, asked) in enumerate(
+                zip(self.after.validation, self.excitation, strict=False)
+            )
+            if c.over_noise(self.noise) > TOLERANCE
+        ]
+        if self.not_compared or not all(asked.cause or within for asked, within in beyond):
+            return ()
+        return tuple(asked for asked, _ in beyond)
+
     @cached_property
     def judgement(self) -> Judgement:
         """The verdict that all numbers support, with the reasons against a better one."""
@@ -393,10 +442,7 @@ class DiagnoseOutcome:
         untouched = [c.over_noise(self.noise) for c in self.after.validation]
         if finding.verdict == NOTHING_MISSING and self.prediction_errors:
             # what the parameters' own error explains is no missing effect
-            untouched = [
-                over / math.hypot(1.0, own / self.noise)
-                for over, own in zip(untouched, self.prediction_errors, strict=True)
-            ]
+            untouched = self._within_parameters
         # of a film with the error that its model is allowed
         noise = math.sqrt(sum(s.noise**2 for s in finding.after) / len(finding.after))
         return judge(
@@ -407,6 +453,7 @@ class DiagnoseOutcome:
             (finding.baseline.selection_rms / noise, finding.final.selection_rms / noise),
             any(c.moves_at_rest for c in self.after.train),
             self.gain,
+            bool(self.undetermined),
         )
 
     @property

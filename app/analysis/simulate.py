@@ -23,11 +23,11 @@ from dearig.recording.reading.reader import open_recording
 from dearig.recording.reading.recording import Recording
 from dearig.recording.writing.save import save_recording
 
-__all__ = ["Prediction", "save_prediction", "simulate_model"]
+__all__ = ["SimulatedRecord", "save_prediction", "simulate_model"]
 
 
 @dataclass(frozen=True)
-class Prediction:
+class SimulatedRecord:
     """What ``model`` predicts under a drive.
 
     ``values`` are arrays (N,) in SI units by the names that a recording has, ``time`` first;
@@ -54,7 +54,7 @@ def simulate_model(
     *,
     rig_file: RigFile | None = None,
     voltage: str = "command",
-) -> Prediction:
+) -> SimulatedRecord:
     """Drive ``model`` with a recording or a sequence; a path is opened, and so is a preset's name.
 
     A recorded voltage is followed as the recording says (held by the converter, or linear between
@@ -68,7 +68,7 @@ def simulate_model(
     if isinstance(drive, LoadedSequence):
         rate = float((rig_file or RigFile()).card.sample_rate_Hz)
         values, field_max, pull_in = _actuator(given.model, Drive(*drive.sample(rate)))
-        return Prediction(
+        return SimulatedRecord(
             title=f"{given.name} under {drive.sequence.name}",
             kind="actuator",
             model=given,
@@ -79,7 +79,7 @@ def simulate_model(
         )
     title = f"{given.name} under {drive.title or drive.name}"
     if drive.kind == "film":
-        return Prediction(
+        return SimulatedRecord(
             title=title,
             kind="film",
             model=given,
@@ -89,7 +89,7 @@ def simulate_model(
         )
     driven = Readings(drive, voltage, given.assumes_held_voltage).voltage
     values, field_max, pull_in = _actuator(given.model, driven)
-    return Prediction(
+    return SimulatedRecord(
         title=title,
         kind="actuator",
         model=given,
@@ -101,7 +101,7 @@ def simulate_model(
     )
 
 
-def save_prediction(prediction: Prediction, out: str | Path, overwrite: bool = False) -> Path:
+def save_prediction(prediction: SimulatedRecord, out: str | Path, overwrite: bool = False) -> Path:
     """Write ``prediction`` as a recording (``.h5``) or a table (``.csv``) and return the path.
 
     Raises ``InputError`` for another ending, or where the file may not be written.

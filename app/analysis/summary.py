@@ -35,9 +35,9 @@ __all__ = [
     "Assessment",
     "Curves",
     "Difference",
-    "Quantity",
     "RecordingSummary",
     "Spectra",
+    "SummaryNumber",
     "assess",
     "curves",
     "differences",
@@ -229,7 +229,7 @@ def how_it_ended(summary: RecordingSummary) -> tuple[str, str]:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class SummaryNumber:
     """A number of a recording that can be a column or a trend: ``label`` with its unit."""
 
     key: str
@@ -239,20 +239,24 @@ class Quantity:
 
 #: The numbers of a summary, in the units in which they are shown.
 QUANTITIES = (
-    Quantity("rms_um", "RMS error (µm)", "RMS error of the chosen model"),
-    Quantity("over_noise", "RMS error / noise", "RMS error over the noise floor; 1 is the best"),
-    Quantity("nrmse_pct", "NRMSE (%)", "RMS error in % of the measured range"),
-    Quantity("max_um", "Largest error (µm)", "Largest error of the chosen model"),
-    Quantity("noise_um", "Noise floor (µm)", "Noise of the displacement at 0 V"),
-    Quantity("peak_kV", "Peak voltage (kV)", "Largest commanded voltage"),
-    Quantity("monitor_kV", "Peak monitor voltage (kV)", "Largest voltage that was measured"),
-    Quantity("peak_mm", "Peak displacement (mm)", "Largest displacement"),
-    Quantity("mm_per_kV2", "Displacement / voltage² (mm/kV²)", "Peak values; a soft film has more"),
-    Quantity("current_mA", "Peak current (mA)", "Largest current that was measured"),
-    Quantity("temperature_C", "Peak temperature (°C)", "Largest temperature"),
-    Quantity("stress_kPa", "Peak stress (kPa)", "Largest nominal stress of a film"),
-    Quantity("duration_s", "Duration (s)", "Duration of the run"),
-    Quantity("events", "Events", "Events that are warnings or faults"),
+    SummaryNumber("rms_um", "RMS error (µm)", "RMS error of the chosen model"),
+    SummaryNumber(
+        "over_noise", "RMS error / noise", "RMS error over the noise floor; 1 is the best"
+    ),
+    SummaryNumber("nrmse_pct", "NRMSE (%)", "RMS error in % of the measured range"),
+    SummaryNumber("max_um", "Largest error (µm)", "Largest error of the chosen model"),
+    SummaryNumber("noise_um", "Noise floor (µm)", "Noise of the displacement at 0 V"),
+    SummaryNumber("peak_kV", "Peak voltage (kV)", "Largest commanded voltage"),
+    SummaryNumber("monitor_kV", "Peak monitor voltage (kV)", "Largest voltage that was measured"),
+    SummaryNumber("peak_mm", "Peak displacement (mm)", "Largest displacement"),
+    SummaryNumber(
+        "mm_per_kV2", "Displacement / voltage² (mm/kV²)", "Peak values; a soft film has more"
+    ),
+    SummaryNumber("current_mA", "Peak current (mA)", "Largest current that was measured"),
+    SummaryNumber("temperature_C", "Peak temperature (°C)", "Largest temperature"),
+    SummaryNumber("stress_kPa", "Peak stress (kPa)", "Largest nominal stress of a film"),
+    SummaryNumber("duration_s", "Duration (s)", "Duration of the run"),
+    SummaryNumber("events", "Events", "Events that are warnings or faults"),
 )
 
 

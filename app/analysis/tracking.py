@@ -35,7 +35,7 @@ from dearig.model.control import (
     readings_under,
 )
 from dearig.model.errors import ModelError
-from dearig.model.fitting.parameters import NORMAL_95, Layout
+from dearig.model.fitting.parameters import NORMAL_95, FitLayout
 from dearig.model.readings.noise import noise_of
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.excitation import Sampled, Sequence
@@ -467,7 +467,7 @@ def alternatives_of(model: ModelFile) -> tuple[Actuator, ...]:
     actuator, table = model.model, model.history.get("covariance")
     if not isinstance(actuator, Actuator) or not isinstance(table, dict):
         return ()
-    layout = Layout(actuator)
+    layout = FitLayout(actuator)
     try:
         columns = [layout.names.index(name) for name in table["names"]]
         covariance = np.array(table["matrix"], dtype=np.float64)

@@ -31,11 +31,11 @@ class Prediction:
 
     Attributes
     ----------
-    prediction : dearig.analysis.simulate.Prediction
+    prediction : dearig.analysis.simulate.SimulatedRecord
         All values, with the highest true field in V/m and the static pull-in voltage in V.
     """
 
-    prediction: simulate.Prediction
+    prediction: simulate.SimulatedRecord
 
     @property
     def model(self) -> Model:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, overload
 
 from dearig.api.display import table_html
 from dearig.extras import import_extra
-from dearig.report.text.numbers import NO_VALUE, significant
+from dearig.report.text.numbers import NO_VALUE, interval_ends, quoted, significant
 from dearig.report.text.tables import Row, Table
 from dearig.units import SHOWN
 
@@ -120,15 +120,18 @@ class Rows(Sequence[T], Generic[T]):
         names = [field.name for field in fields(self._rows[0])]  # type: ignore[arg-type]
         names = [n for n in names if any(getattr(row, n) not in ("", None) for row in self._rows)]
         head = tuple((name.replace("_", " "), "") for name in names)
-        lines = tuple(
-            Row(tuple(_shown(getattr(row, name)) for name in names)) for row in self._rows
-        )
+        lines = tuple(Row(tuple(_shown(row, name) for name in names)) for row in self._rows)
         return table_html(Table("", head, lines))
 
 
-def _shown(value: object) -> str:
+def _shown(row: object, name: str) -> str:
+    value = getattr(row, name)
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(row, Parameter) and name in ("value", "low95", "high95"):
+        low, high = interval_ends(row.low95, row.high95)
+        ends = {"low95": low, "high95": high}
+        return ends.get(name) or quoted(row.value, row.low95, row.high95)
     if isinstance(value, float):
         return significant(value, 4)
     return NO_VALUE if value is None else str(value)

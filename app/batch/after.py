@@ -18,7 +18,7 @@ from dearig.config.rigfile import RigFile
 from dearig.errors import InputError, Interrupted
 from dearig.progress import Progress, quiet
 
-__all__ = ["Compute", "Computed", "band_violation", "compute"]
+__all__ = ["AfterRun", "Compute", "band_violation", "compute"]
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ MODELS = "models"
 
 
 @dataclass
-class Computed:
+class AfterRun:
     """What was computed after a run: numbers by name, the fitted model's file, and problems."""
 
     numbers: dict[str, float] = field(default_factory=dict)
@@ -36,7 +36,7 @@ class Computed:
 
 
 #: What computes after a run, with the parameters of ``compute``.
-Compute = Callable[[Campaign, Path, Path, str, RigFile, Progress], Computed]
+Compute = Callable[[Campaign, Path, Path, str, RigFile, Progress], AfterRun]
 
 
 def compute(
@@ -46,14 +46,14 @@ def compute(
     last_model: str,
     rig_file: RigFile,
     progress: Progress = quiet,
-) -> Computed:
+) -> AfterRun:
     """Do what the plan of ``campaign`` asks for after a run.
 
     The recording is first compared with ``last_model`` (a file in ``folder``), which it has not
     been fitted to, and then fitted. What cannot be computed is a problem that is noted; the
     campaign goes on. Raises ``Interrupted`` for a diagnosis that the operator ended.
     """
-    found = Computed()
+    found = AfterRun()
 
     def validate() -> None:
         model = _model(campaign, folder, last_model)

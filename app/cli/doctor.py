@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from dearig import log_file
-from dearig.cli.output import version
 from dearig.printable import printable
+from dearig.revision import revision, version
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
@@ -80,10 +80,7 @@ def _guarded(section: str, look: Callable[[], Iterator[Item]]) -> Iterator[Item]
 
 
 def _programs() -> Iterator[Item]:
-    from dearig.recording.content.provenance import git_revision
-
-    revision = git_revision()
-    yield Item("programs", "dearig", version() + (f" (revision {revision})" if revision else ""))
+    yield Item("programs", "dearig", revision().text(version()))
     yield Item("programs", "Python", f"{platform.python_version()} at {sys.executable}")
     yield Item("programs", "system", platform.platform())
 

@@ -35,7 +35,7 @@ from dearig.cli.last_words import (
     silence_libraries,
 )
 from dearig.cli.lost_interrupt import note_lost
-from dearig.cli.output import version, with_hints
+from dearig.cli.output import with_hints
 from dearig.command_line import without_secrets
 from dearig.errors import DearigError, DiskFault, InputError, Interrupted
 from dearig.printable import MESSAGE_MAX, PrintableStream, printable
@@ -58,7 +58,9 @@ for _group in (run, track, hold, campaign, watch, files, fit, study, trends, too
 
 def _show_version(asked: bool) -> None:
     if asked:
-        sys.stdout.write(f"dearig {version()}\n")
+        from dearig.revision import revision, version
+
+        sys.stdout.write(f"dearig {revision().text(version())}\n")
         raise typer.Exit
 
 
@@ -340,6 +342,8 @@ def _say(message: str) -> None:
 
 def _tell_unexpected(error: BaseException, written: log_file.LogFile) -> None:
     """Log ``error`` with its traceback, and say in one sentence where that is."""
+    from dearig.revision import version
+
     log.error(
         "unexpected error in dearig %s, Python %s, %s",
         version(), platform.python_version(), platform.platform(),

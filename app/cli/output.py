@@ -28,21 +28,10 @@ __all__ = [
     "optional",
     "print_line",
     "print_lines",
-    "version",
     "with_hints",
     "working",
     "write_result",
 ]
-
-
-def version() -> str:
-    """Return the version of the installed package, "unknown" where it is not installed."""
-    from importlib import metadata
-
-    try:
-        return metadata.version("dearig")
-    except metadata.PackageNotFoundError:
-        return "unknown"
 
 
 def optional(path: Path | None) -> list[Path]:

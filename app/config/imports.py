@@ -10,7 +10,7 @@ from dearig.model.errors import ModelError
 from dearig.model.film.specimen import Film, Load
 from dearig.recording.content.assumed import ASSUMED, FILM_VALUES
 from dearig.recording.content.metadata import RunMetadata
-from dearig.recording.importers.quantities.units import Scale
+from dearig.recording.importers.quantities.units import UnitScale
 
 if TYPE_CHECKING:
     from dearig.config.rigfile import RigFile
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 __all__ = ["imported_metadata", "raw_scales"]
 
 
-def raw_scales(rig: RigFile) -> dict[str, Scale]:
+def raw_scales(rig: RigFile) -> dict[str, UnitScale]:
     """Return the scales from volts at the card to the film, by quantity."""
     amplifier, laser = rig.amplifier, rig.laser
-    monitor = Scale(1e3, amplifier.monitor_V_per_kV)
+    monitor = UnitScale(1e3, amplifier.monitor_V_per_kV)
     return {
-        "voltage": Scale(amplifier.gain_V_per_V),
+        "voltage": UnitScale(amplifier.gain_V_per_V),
         "voltage_monitor": monitor,
-        "current": Scale(1e-3, amplifier.current_monitor_V_per_mA),
-        "displacement": Scale(laser.mm_per_V, 1e3),
+        "current": UnitScale(1e-3, amplifier.current_monitor_V_per_mA),
+        "displacement": UnitScale(laser.mm_per_V, 1e3),
     }
 
 

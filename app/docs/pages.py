@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 
 from dearig.errors import InputError
 
-__all__ = ["HOME", "OPEN_SECTIONS", "Page", "file_at", "page_at", "page_named", "pages"]
+__all__ = ["HOME", "OPEN_SECTIONS", "DocumentPage", "file_at", "page_at", "page_named", "pages"]
 
 #: The page that opens first.
 HOME = "app/docs/README.md"
@@ -42,7 +42,7 @@ OPEN_SECTIONS = tuple(name for name, _ in _SECTIONS[:-1])
 
 
 @dataclass(frozen=True)
-class Page:
+class DocumentPage:
     """One document.
 
     Attributes
@@ -69,20 +69,21 @@ class Page:
 
 
 @cache
-def pages() -> tuple[Page, ...]:
+def pages() -> tuple[DocumentPage, ...]:
     """Return all documents in reading order."""
     found = [
-        Page(path, _title(file), _SECTIONS[_section(path)][0], file) for path, file in _documents()
+        DocumentPage(path, _title(file), _SECTIONS[_section(path)][0], file)
+        for path, file in _documents()
     ]
     return tuple(sorted(found, key=lambda page: _order(page.path)))
 
 
-def page_at(path: str) -> Page | None:
+def page_at(path: str) -> DocumentPage | None:
     """Return the page with this path in the repository; None if there is none."""
     return next((page for page in pages() if page.path == path), None)
 
 
-def page_named(name: str) -> Page:
+def page_named(name: str) -> DocumentPage:
     """Return the page that a person means by ``name``.
 
     ``name`` is a path (``drivers/SAFETY.md``), the end of one (``commands``, ``how-to/rig-pc``),

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from dearig.docs.pages import OPEN_SECTIONS, Page, file_at, page_at, pages
+from dearig.docs.pages import OPEN_SECTIONS, DocumentPage, file_at, page_at, pages
 from dearig.errors import InputError
 from dearig.formulas import as_text, mathml
 
@@ -21,7 +21,7 @@ __all__ = ["anchors", "build", "slug", "to_html"]
 Address = Callable[[str], str | None]
 
 
-def to_html(page: Page, address: Address | None = None, *, formulas: bool = True) -> str:
+def to_html(page: DocumentPage, address: Address | None = None, *, formulas: bool = True) -> str:
     """Return the body of a page as HTML.
 
     Parameters
@@ -130,7 +130,7 @@ def _html(path: str) -> str:
 
 
 def _sections(
-    shown: Page, every: tuple[Page, ...], to: Callable[[str], str]
+    shown: DocumentPage, every: tuple[DocumentPage, ...], to: Callable[[str], str]
 ) -> list[dict[str, Any]]:
     """Sections of the navigation with their pages as (title, address, path).
 
@@ -146,7 +146,7 @@ def _sections(
 
 
 def _neighbour(
-    every: tuple[Page, ...], index: int, to: Callable[[str], str]
+    every: tuple[DocumentPage, ...], index: int, to: Callable[[str], str]
 ) -> tuple[str, str] | None:
     if not 0 <= index < len(every):
         return None

@@ -318,6 +318,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "seconds": _number(experiment.seconds),
         },
         "experiment_words": outcome.experiment_words,
+        "excitation": _excitation_json(outcome),
         "rounds": [
             {
                 "base": list(r.base),
@@ -357,6 +358,49 @@ def _displacement_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "before": _number(finding.baseline.train_rms),
         "after": _number(finding.final.train_rms),
         "reason": None,
+    }
+
+
+def _excitation_json(outcome: DiagnoseOutcome) -> dict[str, Any] | None:
+    """What the validation recordings ask of the model, and what training shows of that."""
+    tested, record = outcome.tested, outcome.determining
+    if tested is None:
+        return None
+    return {
+        "determined": not outcome.undetermined,
+        "tested": {
+            "voltage_kV": _number(tested.voltage / 1e3),
+            "rate_kV_per_s": _number(tested.rate / 1e3),
+            "from_Hz": _number(tested.low),
+            "to_Hz": _number(tested.high),
+        },
+        "records": [
+            {
+                "record": asked.name,
+                "open_over_noise": _number(asked.open_rms),
+                "error_share": _number(asked.share),
+                "error_share_above_training_voltage": _number(asked.above),
+                "not_determined": [
+                    {
+                        "from_Hz": _number(band.low),
+                        "to_Hz": _number(band.high),
+                        "asked_over_noise": _number(band.asked),
+                        "known_pct": _number(100.0 * band.known),
+                    }
+                    for band in asked.undetermined
+                ],
+            }
+            for asked in outcome.excitation
+        ],
+        "parameters_um": [_number(error * 1e6) for error in outcome.prediction_errors],
+        "record": None
+        if record is None
+        else {
+            "name": record.name,
+            "seconds": _number(record.seconds),
+            "open_over_noise": _number(record.open_rms),
+            "sequence": record.sequence,
+        },
     }
 
 

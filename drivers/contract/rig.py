@@ -20,9 +20,9 @@ from dearig.drivers.channels import CHANNEL_NAMES
 from dearig.drivers.errors import ChangedWaveform, RigError, RigStateError
 from dearig.drivers.gate import (
     BlockGate,
+    FilmForecast,
     GatedWaveform,
     Limits,
-    Prediction,
     admit,
     open_block_gate,
 )
@@ -48,9 +48,9 @@ RATE = 1000.0
 FIELD_PER_VOLT = 1.25e3  # 1/m: a film of 1 mm, stretched
 
 
-def foreseen(samples: int) -> Prediction:
+def foreseen(samples: int) -> FilmForecast:
     """Return the prediction of a film that does not move."""
-    return Prediction(np.full(samples, FIELD_PER_VOLT), 2e-16)
+    return FilmForecast(np.full(samples, FIELD_PER_VOLT), 2e-16)
 
 
 def lobes(

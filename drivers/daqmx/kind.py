@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dearig.drivers.daqmx import inspection, rig
 from dearig.drivers.daqmx.address import Address
+from dearig.drivers.daqmx.inputs import DaqmxInputs
+from dearig.drivers.inputs import Inputs
 from dearig.drivers.instruments.findings import Finding
 from dearig.drivers.instruments.registered import instrument_findings, reading_findings
 from dearig.drivers.rig import Rig
@@ -22,6 +24,15 @@ class DaqmxKind:
     def open(self, address: str, settings: RigSettings, options: RigOptions) -> Rig:  # noqa: ARG002
         """Return the rig at ``address``, with a guardian process."""
         return rig.open_daqmx_rig(address, settings)
+
+    def open_inputs(
+        self,
+        address: str,
+        settings: RigSettings,
+        options: RigOptions,  # noqa: ARG002
+    ) -> Inputs:
+        """Return the inputs of the card at ``address``; see ``ReadsInputs``."""
+        return DaqmxInputs(Address.parse(address), settings)
 
     def inspect(
         self,

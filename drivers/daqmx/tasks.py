@@ -21,13 +21,21 @@ from dearig.drivers.daqmx.explain import TIMEOUT, instrument_errors
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import clear
 from dearig.drivers.errors import RigError
-from dearig.drivers.settings import RigSettings
+from dearig.drivers.settings import CardSettings, RigSettings
 
 if TYPE_CHECKING:
     import nidaqmx
     from nidaqmx.system import WatchdogTask
 
-__all__ = ["Card", "ClockedTasks", "identify_card"]
+__all__ = [
+    "Card",
+    "ClockedTasks",
+    "actual_channels",
+    "add_inputs",
+    "identify_card",
+    "read_counts",
+    "time_conversions",
+]
 
 _READER_BUFFER = 4.0  # times the reader's delay that ends a run
 _PIECE = 1 << 20  # samples in one request: a server bounds its size
@@ -60,6 +68,63 @@ def identify_card(link: Link, device: str, settings: RigSettings) -> Card:
         return Card(model, serial, simulated, tasks.channels())
     finally:
         tasks.close()
+
+
+def add_inputs(task: nidaqmx.Task, device: str, settings: RigSettings) -> None:
+    """Add the rig's inputs to ``task``, in the order of a block's rows."""
+    from nidaqmx.constants import TerminalConfiguration
+
+    terminals, ranges, wiring = settings.terminals(), settings.ranges(), settings.wiring()
+    for name in settings.channel_names[1:]:
+        task.ai_channels.add_ai_voltage_chan(
+            f"{device}/{terminals[name]}",
+            name_to_assign_to_channel=name,
+            terminal_config=TerminalConfiguration[wiring[name]],
+            min_val=-ranges[name],
+            max_val=ranges[name],
+        )
+
+
+def time_conversions(task: nidaqmx.Task, card: CardSettings) -> None:
+    """Let the inputs of ``task`` be converted one after another as ``card`` says."""
+    from nidaqmx.constants import DigitalWidthUnits
+
+    task.timing.ai_conv_rate = 1e6 / card.convert_interval_us
+    task.timing.delay_from_samp_clk_delay_units = DigitalWidthUnits.SECONDS
+    task.timing.delay_from_samp_clk_delay = card.first_convert_us * 1e-6
+
+
+def actual_channels(task: nidaqmx.Task, settings: RigSettings) -> tuple[Channel, ...]:
+    """Return the rig's channels with the scaling and the skew of the reserved inputs ``task``."""
+    coefficients = {
+        channel.name: tuple(channel.ai_dev_scaling_coeff) for channel in task.ai_channels
+    }
+    first = task.timing.delay_from_samp_clk_delay
+    interval = 1.0 / task.timing.ai_conv_rate
+    # the card corrects its output itself, so the nominal scaling holds
+    coefficients["voltage_command"] = (0.0, settings.card.ao_range_V / 32768.0)
+    inputs = len(settings.channel_names) - 1
+    return settings.channels(coefficients, [first + i * interval for i in range(inputs)])
+
+
+def read_counts(task: nidaqmx.Task, inputs: int, samples: int, wait: float) -> np.ndarray:
+    """Return counts (inputs, n) int16 of the next ``samples``, or fewer after ``wait`` s."""
+    import nidaqmx.errors
+    from nidaqmx.stream_readers import AnalogUnscaledReader
+
+    counts = np.empty((inputs, samples), dtype=np.int16)
+    reader = AnalogUnscaledReader(task.in_stream)
+    reader.verify_array_shape = False  # the shape is right, and the check costs a call
+    try:
+        read = reader.read_int16(counts, samples, wait)
+    except nidaqmx.errors.DaqReadError as error:
+        if error.error_code != TIMEOUT:
+            raise
+        read = error.samps_per_chan_read
+    if read == samples:
+        return counts
+    # rows follow each other without gaps, at the length that was read
+    return counts.reshape(-1)[: inputs * read].reshape(inputs, read).copy()
 
 
 class ClockedTasks:
@@ -95,16 +160,7 @@ class ClockedTasks:
             self._output().control(TaskMode.TASK_RESERVE)
             ai = self._make_inputs(settings.card.sample_rate_Hz)
             ai.control(TaskMode.TASK_RESERVE)
-            coefficients = {
-                channel.name: tuple(channel.ai_dev_scaling_coeff) for channel in ai.ai_channels
-            }
-            first = ai.timing.delay_from_samp_clk_delay
-            interval = 1.0 / ai.timing.ai_conv_rate
-        # the card corrects its output itself, so the nominal scaling holds
-        step = settings.card.ao_range_V / 32768.0
-        coefficients["voltage_command"] = (0.0, step)
-        inputs = len(settings.channel_names) - 1
-        return settings.channels(coefficients, [first + i * interval for i in range(inputs)])
+            return actual_channels(ai, settings)
 
     def prepare(self, command: Command, rate: float) -> float:
         """Reserve the card for ``command`` at ``rate`` Hz; returns the actual rate."""
@@ -150,26 +206,11 @@ class ClockedTasks:
 
     def read(self, samples: int, wait: float) -> np.ndarray:
         """Return counts (inputs, n) int16 of the next ``samples``, or fewer after ``wait`` s."""
-        import nidaqmx.errors
-        from nidaqmx.stream_readers import AnalogUnscaledReader
-
-        counts = np.empty((len(self._settings.channel_names) - 1, samples), dtype=np.int16)
         ai = self._inputs()
         with self._errors():
             if self._watchdog is not None:
                 self._watchdog.reset_timer()
-            reader = AnalogUnscaledReader(ai.in_stream)
-            reader.verify_array_shape = False  # the shape is right, and the check costs a call
-            try:
-                read = reader.read_int16(counts, samples, wait)
-            except nidaqmx.errors.DaqReadError as error:
-                if error.error_code != TIMEOUT:
-                    raise
-                read = error.samps_per_chan_read
-        if read == samples:
-            return counts
-        # rows follow each other without gaps, at the length that was read
-        return counts.reshape(-1)[: counts.shape[0] * read].reshape(counts.shape[0], read).copy()
+            return read_counts(ai, len(self._settings.channel_names) - 1, samples, wait)
 
     def waiting(self) -> int:
         """Return the samples of each input that were acquired and not read."""
@@ -262,19 +303,11 @@ class ClockedTasks:
 
     def _make_inputs(self, rate: float) -> nidaqmx.Task:
         import nidaqmx
-        from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, TerminalConfiguration
+        from nidaqmx.constants import AcquisitionType
 
         settings, card = self._settings, self._settings.card
-        terminals, ranges, wiring = settings.terminals(), settings.ranges(), settings.wiring()
         self._ai = ai = nidaqmx.Task(grpc_options=self._link.session)
-        for name in settings.channel_names[1:]:
-            ai.ai_channels.add_ai_voltage_chan(
-                f"{self._device}/{terminals[name]}",
-                name_to_assign_to_channel=name,
-                terminal_config=TerminalConfiguration[wiring[name]],
-                min_val=-ranges[name],
-                max_val=ranges[name],
-            )
+        add_inputs(ai, self._device, settings)
         # large enough at any rate for the interlock to see a late reader before samples are lost
         buffer = max(
             card.ai_buffer_samples, round(_READER_BUFFER * settings.interlocks.late_s * rate)
@@ -286,9 +319,7 @@ class ClockedTasks:
             samps_per_chan=buffer,
         )
         ai.in_stream.input_buf_size = buffer
-        ai.timing.ai_conv_rate = 1e6 / card.convert_interval_us
-        ai.timing.delay_from_samp_clk_delay_units = DigitalWidthUnits.SECONDS
-        ai.timing.delay_from_samp_clk_delay = card.first_convert_us * 1e-6
+        time_conversions(ai, card)
         return ai
 
     def _time_output(self) -> None:

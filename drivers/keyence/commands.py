@@ -33,7 +33,7 @@ __all__ = [
     "QUANTITIES",
     "SAMPLING_US",
     "STATUS_ERROR",
-    "Command",
+    "SerialCommand",
 ]
 
 _VALUE = re.compile(r"[+-](?=.{7}$)\d+\.?\d*|[+-]F{7}|X{8}|-{8}")  # a sign and seven characters
@@ -46,7 +46,7 @@ _MODE_CHANGE = 6.0  # s; a change takes 0.6 s, and 0.75 s more for each extensio
 
 
 @dataclass(frozen=True)
-class Command:
+class SerialCommand:
     """Command: ``letters`` with a place for OUT, ``values`` of the reply, s to wait for it."""
 
     letters: str
@@ -59,18 +59,18 @@ class Command:
 
 
 COMMANDS = {
-    "program": Command("PR", (_NUMBER,)),
-    "measured value": Command("MS,{out:02d}", (_VALUE,)),
-    "setting mode": Command("Q0", timeout=_MODE_CHANGE),
-    "measuring mode": Command("R0", timeout=_MODE_CHANGE),
+    "program": SerialCommand("PR", (_NUMBER,)),
+    "measured value": SerialCommand("MS,{out:02d}", (_VALUE,)),
+    "setting mode": SerialCommand("Q0", timeout=_MODE_CHANGE),
+    "measuring mode": SerialCommand("R0", timeout=_MODE_CHANGE),
     # the following commands work in the setting mode only
-    "sampling cycle": Command("SR,CA", (_CHOICE,)),
-    "measurement scaling": Command("SR,OB,{out:02d}", (_SETTING,) * 4),
-    "filter": Command("SR,OC,{out:02d}", (_CHOICE,) * 2),
-    "calculation": Command("SR,OD,{out:02d}", (_CHOICE,)),
-    "display unit": Command("SR,OG,{out:02d}", (_CHOICE,)),
-    "analog scaling": Command("SR,OH,{out:02d}", (_SETTING,) * 4),
-    "quantity": Command("SR,OI,{out:02d}", (_CHOICE,)),
+    "sampling cycle": SerialCommand("SR,CA", (_CHOICE,)),
+    "measurement scaling": SerialCommand("SR,OB,{out:02d}", (_SETTING,) * 4),
+    "filter": SerialCommand("SR,OC,{out:02d}", (_CHOICE,) * 2),
+    "calculation": SerialCommand("SR,OD,{out:02d}", (_CHOICE,)),
+    "display unit": SerialCommand("SR,OG,{out:02d}", (_CHOICE,)),
+    "analog scaling": SerialCommand("SR,OH,{out:02d}", (_SETTING,) * 4),
+    "quantity": SerialCommand("SR,OI,{out:02d}", (_CHOICE,)),
 }
 
 SAMPLING_US = (2.55, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)

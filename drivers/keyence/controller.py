@@ -21,7 +21,7 @@ from dearig.drivers.keyence.commands import (
     QUANTITIES,
     SAMPLING_US,
     STATUS_ERROR,
-    Command,
+    SerialCommand,
 )
 from dearig.drivers.keyence.compare import ControllerSettings
 from dearig.drivers.settings import LaserSettings
@@ -266,7 +266,7 @@ class Keyence:
             ) from error
         raise self._unanswered(text, seen)
 
-    def _values(self, command: Command, text: str, line: bytes) -> list[str]:
+    def _values(self, command: SerialCommand, text: str, line: bytes) -> list[str]:
         asked = text.split(",")
         fields = line.strip(b" \n").decode("ascii", "replace").upper().split(",")
         if fields[0] == "ER" and len(fields) == 3 and fields[1] in asked and fields[2].isdecimal():

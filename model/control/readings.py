@@ -12,7 +12,7 @@ from dearig.model.control.learning_settings import LearningSettings
 from dearig.model.readings.noise import READINGS_MIN, about_rest
 
 __all__ = [
-    "Readings",
+    "RunReadings",
     "bridged",
     "has_jump",
     "lines_at_rest",
@@ -29,7 +29,7 @@ _MEDIAN_OF_NORMAL = 0.6745  # median of |x| for a normal x of unit variance
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class RunReadings:
     """Readings ``values`` (N,) in m from rest, which are ``usable`` (N,), and why others are not.
 
     ``noise`` in m is the standard deviation of one, that of the reading's steps included.
@@ -74,7 +74,7 @@ def sorted_out(
     rate: float,
     lead_in: int,
     settings: LearningSettings,
-) -> Readings:
+) -> RunReadings:
     """Return which of the readings ``given`` (any number) in m may be used, from rest.
 
     ``predicted`` (N,) in m is what was expected at ``rate`` Hz, ``noise`` in m that of a reading,
@@ -106,7 +106,7 @@ def sorted_out(
     for mask, words in ((spikes, "spikes"), (stuck, "stuck readings")):
         if mask.any():
             notes.append(f"{np.count_nonzero(mask)} {words} are left out")
-    return Readings(given, usable & ~spikes & ~stuck, noise, notes)
+    return RunReadings(given, usable & ~spikes & ~stuck, noise, notes)
 
 
 def lines_at_rest(

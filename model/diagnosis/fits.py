@@ -31,7 +31,7 @@ from dearig.model.fitting.identify import fit_globally, is_worth_freeing
 from dearig.model.fitting.intervals import correlation_time, is_flat
 from dearig.model.fitting.levenberg import LocalFit, descend
 from dearig.model.fitting.parallel import Job, Result, parallel_map
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.search import voltage_starts
 from dearig.model.fitting.slow_noise import (
     DriftSpace,
@@ -298,7 +298,7 @@ class Fitter:
         self, records: Sequence[Record], model: Actuator | Strip, fidelity: int
     ) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
         """Return ``records`` without spikes, and without heavy tails as well."""
-        layout = Layout(model)
+        layout = FitLayout(model)
         x = layout.coordinates(layout.initial())
         whole, normal = [], []
         for record in records:
@@ -330,13 +330,13 @@ class Fitter:
         drift: float = 0.0,
         fidelity: int = kernel.QUICK,
         full: bool = False,
-        layout: Layout | None = None,
+        layout: FitLayout | None = None,
     ) -> WhitenedProblem:
         """Return the records with the numbers of ``model`` free, under a ``drift`` in the noise.
 
         Relaxation times are those of the search unless a ``layout`` is given.
         """
-        layout = layout or Layout(model, self.times if self.of_actuator else None)
+        layout = layout or FitLayout(model, self.times if self.of_actuator else None)
         records = self.full if full else self.records
         noise = self.space(full).drift(drift) if self.of_actuator else None
         how: dict[str, Any] = {
@@ -355,7 +355,7 @@ class Fitter:
         self.work.add(simulations, effort)
         self.watched()
 
-    def fixed(self, layout: Layout) -> np.ndarray:
+    def fixed(self, layout: FitLayout) -> np.ndarray:
         """Return which parameters (d,) are held: the locking limits, unless the baseline asks.
 
         And the grids of general laws: with weights between their nodes there is nothing to move.
@@ -437,7 +437,7 @@ class Fitter:
         return fit_of(problem, fit.fixed, found)
 
     def careful_problem(
-        self, model: Actuator | Strip, drift: float, layout: Layout | None = None
+        self, model: Actuator | Strip, drift: float, layout: FitLayout | None = None
     ) -> WhitenedProblem:
         """Return every sample with careful steps; ``drift`` is that of the thinned records."""
         # its variance is in units of one reading's noise, which thinning has lowered
@@ -512,7 +512,7 @@ class Fitter:
         fits = [self.careful(baseline, iterations)]
         if not self.of_actuator:
             return fits[0]
-        layout = Layout(baseline.model)
+        layout = FitLayout(baseline.model)
         problem = self.problem(baseline.model, layout=layout)
         own = baseline.problem.layout.values(baseline.x)
         # the shortest branch as a drag: modulus times relaxation time is what slow motion shows

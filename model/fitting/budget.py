@@ -17,7 +17,7 @@ import numpy as np
 from dearig.model.errors import ModelError
 from dearig.model.fitting.identify import Identification, coarse_problem
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Contribution, Estimate, GivenValue, Layout
+from dearig.model.fitting.parameters import Contribution, Estimate, FitLayout, GivenValue
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress
 from dearig.model.readings.records import ActuatorRecord, Record
@@ -43,7 +43,7 @@ def with_budget(
     model = fitted.model
     if not isinstance(model, Actuator) or not given:
         return fitted
-    held = np.isin(Layout(model).names, fitted.held_limits)
+    held = np.isin(FitLayout(model).names, fitted.held_limits)
     found = uncertainty_budget(records, model, held, given, workers, progress)
     return replace(fitted, estimates=with_systematic(fitted.estimates, found), budget=found)
 
@@ -63,7 +63,7 @@ def uncertainty_budget(
     drift that it has is fitted to each record for itself. () where ``stop()`` is True before the
     end: a part of the contributions is no budget.
     """
-    problem = coarse_problem(Problem(records, Layout(model), workers))
+    problem = coarse_problem(Problem(records, FitLayout(model), workers))
     layout = problem.layout
     held = held | problem.own
     start = descend(problem, layout.coordinates(layout.initial()), held, gain=_GAIN).x
@@ -74,7 +74,7 @@ def uncertainty_budget(
             if stop():
                 return ()
             moved, changed = _moved(problem.records, model, one.name, sign * one.relative)
-            other = Problem(moved, Layout(changed), workers)
+            other = Problem(moved, FitLayout(changed), workers)
             x = descend(other, start, held, _ITERATIONS, _GAIN, damping=1e-4).x
             ends.append(layout.values(x))
             done += 1

@@ -30,7 +30,7 @@ from dearig.model.effects import EFFECTS, PLACES
 from dearig.model.effects.assembly import AMPLIFIER, HOOK_BITS, active
 from dearig.model.errors import ModelError
 from dearig.model.fitting.intervals import correlation_time
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.slow_noise import Drift, WhitenedProblem
 from dearig.model.kernel import OK
 from dearig.model.kinematics import thinning
@@ -436,7 +436,7 @@ class JointProblem(WhitenedProblem):
     def __init__(
         self,
         records: Sequence[Record],
-        layout: Layout,
+        layout: FitLayout,
         drift: Drift | None,
         channels: Channels,
         **options: object,

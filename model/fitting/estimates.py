@@ -11,7 +11,7 @@ import numpy as np
 
 from dearig.model.fitting.intervals import correlation_time, covariance, profile
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import NORMAL_95, Estimate, Layout
+from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
@@ -152,7 +152,7 @@ def _by_curvature(
     return float(x[index]) - width, float(x[index]) + width
 
 
-def at_bound(layout: Layout, x: np.ndarray) -> np.ndarray:
+def at_bound(layout: FitLayout, x: np.ndarray) -> np.ndarray:
     """Return which coordinates ``x`` (d,) are at an end of their search range, (d,) bool."""
     room = np.minimum(x - layout.lower, layout.upper - x)
     return np.asarray(room <= _AT_END * (1.0 + np.abs(x)))

@@ -18,7 +18,7 @@ from dearig.model.fitting.estimates import at_bound, is_determined
 from dearig.model.fitting.identify import coarse_problem, fit_globally
 from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.levenberg import gain_that_counts
-from dearig.model.fitting.parameters import NORMAL_95, Estimate, Layout, require_free
+from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, require_free
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress
 from dearig.model.readings.records import Record
@@ -232,7 +232,7 @@ def fit_shared(
     some = np.unique(
         np.linspace(0, len(records) - 1, min(_START_RECORDS, len(records))).astype(int)
     )
-    start = Problem([records[i] for i in some], Layout(base), workers)
+    start = Problem([records[i] for i in some], FitLayout(base), workers)
     require_free(start.layout, start.samples)
     found, held = fit_globally(start, None, lambda stage, part: progress(stage, 0.5 * part))
     values = dict(zip(start.layout.names, start.layout.by_relaxation_time(
@@ -256,11 +256,11 @@ def fit_shared(
     return _result(many, x, owned, converged, simulations)
 
 
-def _layout(base: Actuator | Strip, own: Sequence[str]) -> Layout:
+def _layout(base: Actuator | Strip, own: Sequence[str]) -> FitLayout:
     """Return the layout in which ``own`` are free. Raises ``ModelError``."""
     if _PERMITTIVITY in own and not isinstance(base, Actuator):
         raise ModelError("permittivity: a film driven by stretch has none")
-    layout = Layout(base, permittivity=_PERMITTIVITY in own)
+    layout = FitLayout(base, permittivity=_PERMITTIVITY in own)
     for name in own:
         if name not in layout.names:
             why = (
@@ -305,7 +305,7 @@ def _errors(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return np.asarray(np.where(np.diag(normal) > 0.0, errors, np.inf))
 
 
-def _estimates(layout: Layout, x: np.ndarray, sigma: np.ndarray) -> tuple[Estimate, ...]:
+def _estimates(layout: FitLayout, x: np.ndarray, sigma: np.ndarray) -> tuple[Estimate, ...]:
     """Return the estimates at coordinates ``x`` (d,) with standard errors (d,), NaN where held."""
     values = layout.values(x)
     ends = at_bound(layout, x)

@@ -20,7 +20,7 @@ from dearig.model.fitting.estimates import (
 )
 from dearig.model.fitting.intervals import CHI2_95, correlation_time, firm_directions, linear_widths
 from dearig.model.fitting.levenberg import LocalFit, descend, gain_that_counts
-from dearig.model.fitting.parameters import Contribution, Estimate, Layout, require_free
+from dearig.model.fitting.parameters import Contribution, Estimate, FitLayout, require_free
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.rejection import misfit_p
 from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
@@ -120,7 +120,7 @@ def identify(
     """
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
-    layout = Layout(base)
+    layout = FitLayout(base)
     # the algorithm as printed takes the zero of displacement for exact
     problem = Problem(records, layout, workers, exact_zero=method == "de")
     require_free(layout, problem.samples)
@@ -142,7 +142,7 @@ def add_intervals(
     progress: Progress = _quiet,
 ) -> Identification:
     """Return ``fitted`` with 95 % intervals; ``records`` are its training records."""
-    layout = Layout(fitted.model)
+    layout = FitLayout(fitted.model)
     problem = Problem(records, layout, workers)
     held = np.array([name in fitted.held_limits for name in layout.names])
     estimates, names, cov = _intervals(problem, layout.initial(), held, progress)

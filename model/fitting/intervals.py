@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import kolmogorov
 
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 
 __all__ = [
@@ -134,7 +134,7 @@ def _pseudo_inverse(normal: np.ndarray) -> np.ndarray:
 
 
 def firm_directions(
-    jacobian: np.ndarray, values: np.ndarray, layout: Layout, free: np.ndarray
+    jacobian: np.ndarray, values: np.ndarray, layout: FitLayout, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return directions (f, m) in which intervals are linear, and which parameters (d,) are not.
 

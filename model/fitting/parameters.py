@@ -35,9 +35,9 @@ __all__ = [
     "THESIS_RANGES",
     "Contribution",
     "Estimate",
+    "FitLayout",
+    "FreeParameter",
     "GivenValue",
-    "Layout",
-    "Quantity",
 ]
 
 #: Search ranges of the thesis's Algorithm 1: moduli Pa, limits J, relaxation times s.
@@ -52,7 +52,7 @@ _PERMITTIVITY_RANGE = (1.0, 100.0)  # relative: of vacuum, and above that of any
 
 
 @dataclass(frozen=True)
-class Quantity:
+class FreeParameter:
     """One free parameter.
 
     ``kind`` is mu, J, T or ``shape`` of spring ``index`` (0 is the equilibrium spring),
@@ -187,7 +187,7 @@ class Contribution:
     shifts: tuple[float, ...]
 
 
-class Layout:
+class FitLayout:
     """Free parameters of a model: moduli, limits, times, as in the thesis, then those of effects.
 
     ``base`` carries everything that is not free. A fit moves in *coordinates*: moduli as they are,
@@ -212,13 +212,13 @@ class Layout:
         if isinstance(base, Actuator) and base.load.rest_length is not None:
             self._rest = base.load.rest_length / base.film.length
         springs = self.network.springs
-        self.quantities: tuple[Quantity, ...] = (
-            *(Quantity("mu", i) for i in range(len(springs)) if i or self._rest is None),
+        self.quantities: tuple[FreeParameter, ...] = (
+            *(FreeParameter("mu", i) for i in range(len(springs)) if i or self._rest is None),
             *_shapes(springs),
-            *(Quantity("T", i) for i in range(1, len(springs))),
-            *((Quantity("permittivity", 0),) if permittivity else ()),
+            *(FreeParameter("T", i) for i in range(1, len(springs))),
+            *((FreeParameter("permittivity", 0),) if permittivity else ()),
             *(
-                Quantity("effect", i, name)
+                FreeParameter("effect", i, name)
                 for name, _ in base.effects
                 for i in range(len(EFFECTS[name].parameters))
             ),
@@ -315,7 +315,7 @@ class Layout:
         branches = tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
         other = Network(springs[0], branches)
         return np.clip(
-            self.coordinates(Layout(replace(self.base, network=other)).initial()),
+            self.coordinates(FitLayout(replace(self.base, network=other)).initial()),
             self.lower,
             self.upper,
         )
@@ -399,13 +399,13 @@ class Layout:
         return places
 
 
-def _shapes(springs: Sequence[Spring]) -> Iterator[Quantity]:
+def _shapes(springs: Sequence[Spring]) -> Iterator[FreeParameter]:
     """Yield the parameters of the strain energies of ``springs``, the locking limits first."""
     for limits in (True, False):
         for i, spring in enumerate(springs):
             for place, parameter in enumerate(SPRING_LAWS[spring.kind].parameters):
                 if (parameter.name == LIMIT_NAME) == limits:
-                    yield Quantity("J" if limits else "shape", i, law=spring.kind, place=place)
+                    yield FreeParameter("J" if limits else "shape", i, law=spring.kind, place=place)
 
 
 def _spring(c: np.ndarray, k: int) -> Spring:
@@ -416,7 +416,7 @@ def _spring(c: np.ndarray, k: int) -> Spring:
     return Spring(float(c[k + MODULUS]), float(c[k + LIMIT]), kind, tuple(map(float, shape)))
 
 
-def require_free(layout: Layout, samples: int) -> None:
+def require_free(layout: FitLayout, samples: int) -> None:
     """Raise ``ModelError`` for a fit with more unknowns than readings."""
     if samples <= layout.size:
         raise ModelError(

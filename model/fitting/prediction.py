@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dearig.model.fitting.intervals import correlation_time
-from dearig.model.fitting.parameters import NORMAL_95, Layout
+from dearig.model.fitting.parameters import NORMAL_95, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator
@@ -25,7 +25,7 @@ def prediction_error(
     (f, f) of the fitted parameters ``names``, in SI units. A direction that the fit did not
     determine counts as far as the derivatives hold.
     """
-    layout = Layout(model)
+    layout = FitLayout(model)
     free = np.isin(layout.names, names)
     order = [list(names).index(name) for name in np.array(layout.names)[free]]
     values = layout.initial()

@@ -13,7 +13,7 @@ from dearig.model.errors import ModelError
 from dearig.model.fitting.drift import DriftFit, record_drift
 from dearig.model.fitting.offsets import Offsets
 from dearig.model.fitting.parallel import parallel_map
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
 from dearig.model.simulation.actuator import Actuator, readings_of
 from dearig.model.simulation.strip import Strip, stress_of
@@ -53,7 +53,7 @@ class Problem:
     def __init__(
         self,
         records: Sequence[Record],
-        layout: Layout,
+        layout: FitLayout,
         workers: int = 2,
         fidelity: int = kernel.CAREFUL,
         on_simulations: Callable[[int, float], None] | None = None,

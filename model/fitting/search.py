@@ -15,7 +15,7 @@ from dearig.model.coefficients import ELECTRIC, MODULUS
 from dearig.model.errors import ModelError
 from dearig.model.film.material import Branch, Network, Spring
 from dearig.model.film.network import HEAD
-from dearig.model.fitting.parameters import THESIS_RANGES, Layout
+from dearig.model.fitting.parameters import THESIS_RANGES, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.kinematics import electric_along
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
@@ -132,7 +132,7 @@ def _actuator(problem: Problem) -> Actuator:
     return base
 
 
-def _start_values(layout: Layout) -> np.ndarray:
+def _start_values(layout: FitLayout) -> np.ndarray:
     """Return natural start values (d,) at which no spring stiffens."""
     values = layout.initial()
     values[layout.column("J")] = _WIDE_LIMIT
@@ -142,7 +142,7 @@ def _start_values(layout: Layout) -> np.ndarray:
     return values
 
 
-def _wide(layout: Layout) -> tuple[float, ...]:
+def _wide(layout: FitLayout) -> tuple[float, ...]:
     """Return the values at which the equilibrium spring does not stiffen."""
     return _shape_values(layout.network.equilibrium.kind, _WIDE_LIMIT)
 
@@ -287,7 +287,7 @@ def _unit_stresses(
 
 
 def _subsets(
-    layout: Layout,
+    layout: FitLayout,
     first: tuple[float, ...],
     candidates: np.ndarray,
     parts: np.ndarray,
@@ -329,7 +329,7 @@ def _subsets(
     return found
 
 
-def _ranked(layout: Layout, found: list[tuple[float, np.ndarray]], starts: int) -> np.ndarray:
+def _ranked(layout: FitLayout, found: list[tuple[float, np.ndarray]], starts: int) -> np.ndarray:
     """Return the best starts (K, d) that differ in a relaxation time or limit."""
     if not found:
         raise ModelError(

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from dearig.model.fitting.offsets import centred
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.noise import about_rest
 from dearig.model.readings.records import ActuatorRecord, Record
@@ -218,7 +218,7 @@ class WhitenedProblem(Problem):
     def __init__(
         self,
         records: Sequence[Record],
-        layout: Layout,
+        layout: FitLayout,
         drift: Drift | None = None,
         **options: object,
     ) -> None:

@@ -19,7 +19,7 @@ from dearig.sim_backend.daqmx.card.tasks import Kind, Listener, Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.wire import Change, Wire
 from dearig.sim_backend.daqmx.card.wiring import Wiring
-from dearig.sim_backend.daqmx.card.work import Work
+from dearig.sim_backend.daqmx.card.work import CardWork
 from dearig.sim_backend.daqmx.digital.counter_tasks import CounterTasks
 from dearig.sim_backend.daqmx.digital.line_levels import LineLevels
 from dearig.sim_backend.daqmx.digital.lines import DigitalLines
@@ -128,7 +128,7 @@ class SimulatedCard:
             self.levels.forget,  # what was sampled above
         )
 
-    def _analog_work(self, task: Task, kind: Kind) -> Work:
+    def _analog_work(self, task: Task, kind: Kind) -> CardWork:
         work = AnalogInputWork if kind is Kind.AI else AnalogOutputWork
         return work(task, self._analog)
 

@@ -11,7 +11,7 @@ import pytest
 from dearig.analysis.budget import diagnosis_with_budget
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.fitting import Estimate, GivenValue
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.readings.records import counted
 from dearig.report.as_json import diagnosis_json
 from dearig.report.text.diagnosis import summary
@@ -30,7 +30,7 @@ def estimate(name: str, value: float, unit: str = "Pa", determined: bool = True)
 
 
 def found(**changes) -> Diagnosis:
-    layout = Layout(LAGGED)
+    layout = FitLayout(LAGGED)
     names = tuple(n for n in layout.names if not n.startswith("J"))
     estimates = tuple(
         estimate(q.name, float(v), q.unit)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import dearig
+from dearig.api.rows import Parameter, Rows
 from tests.tools.diagnosis import diagnose_outcome
 
 from .conftest import SLOW_RIG
@@ -160,3 +161,10 @@ class TestDiagnose:
             dearig.diagnose(run)
         with pytest.raises(dearig.InputError, match="both to fit and to validate"):
             dearig.diagnose(run, validate=run)
+
+
+def test_a_table_of_parameters_has_the_digits_of_the_intervals():
+    resistance = Parameter("resistance", 48.654e6, "ohm", 48.51e6, 48.79e6, determined=True)
+    page = Rows([resistance])._repr_html_()
+    for shown in ("4.865", "4.851", "4.879"):
+        assert f"{shown} \N{MULTIPLICATION SIGN} 10\N{SUPERSCRIPT SEVEN}" in page

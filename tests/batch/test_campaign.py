@@ -10,7 +10,7 @@ import pytest
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.batch import campaign as module
-from dearig.batch.after import Computed
+from dearig.batch.after import AfterRun
 from dearig.batch.ask import ask
 from dearig.batch.campaign import Arming
 from dearig.batch.forecast import foresee, survey
@@ -246,7 +246,7 @@ def test_another_thread_ends_it_between_two_runs_and_in_a_computation(bench: Ben
     interrupts = Interrupts()
     with pytest.raises(Interrupted, match="2 runs are left"):
         bench.play(
-            PLAN + "rest_s = 5.0\n", computing=lambda *_: interrupts.ask() or Computed(),
+            PLAN + "rest_s = 5.0\n", computing=lambda *_: interrupts.ask() or AfterRun(),
             interrupts=interrupts,
         )  # fmt: skip
     assert states(bench) == ["done", "waiting", "waiting"]
@@ -454,7 +454,7 @@ def test_no_kill_loses_the_extremes_of_a_run(bench: Bench, place: int) -> None:
 
 def computed(monkeypatch: pytest.MonkeyPatch, **facts) -> None:
     """Let each run have these results."""
-    monkeypatch.setattr(module, "compute", lambda *_: Computed(**facts))
+    monkeypatch.setattr(module, "compute", lambda *_: AfterRun(**facts))
 
 
 def test_a_number_that_leaves_its_band_halts_it_and_no_kill_hides_that(

@@ -25,7 +25,7 @@ from dearig.acquisition.prediction import peaks_of, stride_at
 from dearig.acquisition.run import record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
-from dearig.drivers.gate import Prediction, admit
+from dearig.drivers.gate import FilmForecast, admit
 from dearig.drivers.samples import Listed
 from dearig.model.film.material import TABLE_3
 from dearig.model.kinematics import thinning
@@ -77,7 +77,7 @@ def held(seconds: float, rate: float) -> None:
     response = actuator.simulate(drive)
     thin = thinning(actuator.film.held, response.stretch) / actuator.film.thickness
     volume = actuator.film.electric_volume
-    admit(voltage, rate, limits, Prediction(thin, volume, stride=stride))
+    admit(voltage, rate, limits, FilmForecast(thin, volume, stride=stride))
 
 
 def run(seconds: float, rate: float) -> None:

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from dearig.drivers.gate import GatedWaveform, Prediction, admit
+from dearig.drivers.gate import FilmForecast, GatedWaveform, admit
 from dearig.drivers.settings import RigSettings, ThermometerSettings
 from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.amplifier import Amplifier
-from dearig.sim_backend.card import Card
+from dearig.sim_backend.card import Converters
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.laser import Laser
 from dearig.sim_backend.model_plant import ModelPlant
@@ -29,7 +29,7 @@ PARTS: tuple[tuple[str, type, str], ...] = (
     ("amplifier", Amplifier, "advance"),
     ("amplifier", Amplifier, "outputs"),
     ("laser", Laser, "read"),
-    ("converters", Card, "convert"),
+    ("converters", Converters, "convert"),
     ("noise generators", Streams, "of_chunk"),
 )
 
@@ -44,7 +44,7 @@ def thesis_record(settings: RigSettings) -> GatedWaveform:
         lobes.append(amplitude * 1e3 * np.sin(np.pi * frequency * elapsed))
     voltage = np.concatenate((np.zeros(2000), *lobes, *lobes, np.zeros(1000)))
     field_per_volt = np.full(voltage.size, 1.25 / THESIS_FILM.thickness)
-    foreseen = Prediction(field_per_volt, THESIS_FILM.electric_volume)
+    foreseen = FilmForecast(field_per_volt, THESIS_FILM.electric_volume)
     return admit(voltage, RATE, settings.limits.gate_limits(), foreseen)
 
 

@@ -69,7 +69,7 @@ from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator
@@ -442,7 +442,7 @@ def _typical(law: str) -> tuple[tuple[str, float], ...]:
 
 def _fitted(start: Actuator, records: list[Record]) -> tuple[float, Actuator]:
     """Mean square over noise, and the model that is fitted from ``start``."""
-    layout = Layout(start)
+    layout = FitLayout(start)
     problem = Problem(records, layout, workers=1, fidelity=kernel.QUICK)
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True

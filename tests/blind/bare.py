@@ -25,6 +25,8 @@ def values_alone(
     held: np.ndarray,
     report: Callable[[float], None],
     lower_ends: bool = True,
+    which: np.ndarray | None = None,
+    ended: Callable[[], bool] = lambda: False,
 ) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
     """Return estimates at ``values`` (d,) with open intervals."""
     found = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,9 @@ from typing import Any
 
 import pytest
 
+from dearig.model.fitting.estimates import estimates_with_intervals
 from tests.blind import play
+from tests.blind.bare import values_alone
 from tests.blind.play import Bench, Case, case_of
 from tests.blind.score import Score, score
 from tests.blind.seeds import CLEAN_FROM, chosen, clean_seeds, drawn, family_seeds, kind_of
@@ -244,6 +247,11 @@ def test_probabilities_are_held_against_what_is_true() -> None:
     clean = result(())
     clean["diagnosis"]["families"] = [{"family": "none", "probability": 1.0}]
     assert score(clean).brier == 0.0
+
+
+def test_what_leaves_the_intervals_out_takes_the_same_arguments() -> None:
+    whole, bare = (inspect.signature(f) for f in (estimates_with_intervals, values_alone))
+    assert list(bare.parameters) == list(whole.parameters)
 
 
 def test_modes_have_tables_of_their_own() -> None:

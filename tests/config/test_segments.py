@@ -12,10 +12,10 @@ from dearig.acquisition.plan import plan
 from dearig.config.rigfile import RigFile
 from dearig.config.segments import SEGMENT_KINDS, SegmentTable
 from dearig.config.segments.contract import check_segment
-from dearig.config.segments.levels import Hold
+from dearig.config.segments.levels import HoldSegment
 from dearig.config.sequence_example import example, page
 from dearig.config.sequencefile import parse_sequence
-from dearig.drivers.registry import ContractError
+from dearig.drivers.registry import EntryError
 from dearig.model.simulation.excitation import Segment
 from tests.tools.plugins import run_with_distribution
 
@@ -28,7 +28,7 @@ def test_every_kind_keeps_the_contract(tmp_path: Path, kind: str) -> None:
     check_segment(kind, SEGMENT_KINDS[kind], tmp_path)
 
 
-class Jumping(Hold):
+class Jumping(HoldSegment):
     """A hold that says it ends elsewhere than it does."""
 
     def build(self, folder: Path) -> Segment:
@@ -44,7 +44,7 @@ class Jumping(Hold):
         return Wrong()
 
 
-class Noisy(Hold):
+class Noisy(HoldSegment):
     """A hold with noise that is drawn anew whenever it is computed."""
 
     def build(self, folder: Path) -> Segment:
@@ -63,13 +63,13 @@ class Noisy(Hold):
         return cast("Segment", Wrong())
 
 
-class Undescribed(Hold):
+class Undescribed(HoldSegment):
     """A kind with a key that nobody explains."""
 
     level_kV: float = 0.0
 
 
-class Refused(Hold):
+class Refused(HoldSegment):
     """A kind whose example lacks a key."""
 
     example = {}  # noqa: RUF012
@@ -85,7 +85,7 @@ class Refused(Hold):
     ],
 )
 def test_the_contract_finds_a_fault(tmp_path: Path, kind: type[SegmentTable], match: str) -> None:
-    with pytest.raises(ContractError, match=match):
+    with pytest.raises(EntryError, match=match):
         check_segment("hold", kind, tmp_path)
 
 
@@ -166,7 +166,7 @@ def test_a_kind_of_another_distribution_is_found_everywhere(tmp_path: Path) -> N
         (
             "other",
             "bad:Thing",
-            "from dearig.config.segments.levels import Hold as Thing",
+            "from dearig.config.segments.levels import HoldSegment as Thing",
             'must be of the type Literal["other"]',
         ),
     ],

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dearig.drivers import gate
 from dearig.drivers.errors import ChangedWaveform, RefusedWaveform
-from dearig.drivers.gate import BlockGate, Limits, Prediction, admit, open_block_gate
+from dearig.drivers.gate import BlockGate, FilmForecast, Limits, admit, open_block_gate
 from dearig.drivers.samples import Computed
 
 LIMITS = Limits(
@@ -40,7 +40,7 @@ def feedforward(level=6000.0, held=200, limits=LIMITS):
 
 
 def film(samples, field=FIELD, **more):
-    return Prediction(np.full(samples, field), 5e-16, **{"film": "F7", **more})
+    return FilmForecast(np.full(samples, field), 5e-16, **{"film": "F7", **more})
 
 
 def opened(played=None, *, block=BLOCK, authority=AUTHORITY, change=CHANGE, **films):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dearig.drivers.errors import RefusedWaveform
-from dearig.drivers.gate import GatedWaveform, Limits, Prediction, admit, ramp_down
+from dearig.drivers.gate import FilmForecast, GatedWaveform, Limits, admit, ramp_down
 
 LIMITS = Limits(
     voltage_min=-1000.0,
@@ -40,7 +40,7 @@ def gate(voltage, rate=RATE, limits=LIMITS, field=FIELD):
 
 
 def foreseen(shape, field=FIELD, volume=CAPACITANCE / FIELD**2, **more):
-    return Prediction(np.full(shape, field), volume, **{"film": "F7", **more})
+    return FilmForecast(np.full(shape, field), volume, **{"film": "F7", **more})
 
 
 def within(voltage, field_per_volt, limits=LIMITS, rate=RATE):
@@ -154,7 +154,7 @@ def test_the_pieces_in_which_it_is_judged_do_not_matter(inside, stride, piece):
         with patch("dearig.drivers.gate._PIECE", size):
             try:
                 passed = admit(
-                    voltage, RATE, WIDE, Prediction(field, 5e-16, film="F7", stride=stride)
+                    voltage, RATE, WIDE, FilmForecast(field, 5e-16, film="F7", stride=stride)
                 )
                 seen.append([m.reached for m in passed.margins])
             except RefusedWaveform as refused:
@@ -165,7 +165,7 @@ def test_the_pieces_in_which_it_is_judged_do_not_matter(inside, stride, piece):
 def test_a_prediction_holds_for_its_stride():
     voltage = np.array([0.0, 100.0, 200.0, 100.0, 0.0])
     field = np.array([1e3, 2e3, 1e3])
-    passed = admit(voltage, RATE, LIMITS, Prediction(field, 5e-16, film="F7", stride=2))
+    passed = admit(voltage, RATE, LIMITS, FilmForecast(field, 5e-16, film="F7", stride=2))
     assert passed.margins[3].reached == pytest.approx(0.4)  # 200 V where the film is thin
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dearig.drivers import gate
 from dearig.drivers.errors import ChangedWaveform, RefusedWaveform
-from dearig.drivers.gate import Limits, Prediction, admit, ramp_down
+from dearig.drivers.gate import FilmForecast, Limits, admit, ramp_down
 from dearig.drivers.samples import Computed, Repeated
 
 PIECE, KEPT = 8, 2
@@ -44,8 +44,8 @@ def _short_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gate, "_KEPT", KEPT)
 
 
-def still(samples: int) -> Prediction:
-    return Prediction(np.full(samples, 1e3), 5e-16)
+def still(samples: int) -> FilmForecast:
+    return FilmForecast(np.full(samples, 1e3), 5e-16)
 
 
 def admitted(source, **more):
@@ -142,7 +142,7 @@ def test_an_array_that_its_owner_changes_afterwards_is_not_played():
 def test_an_array_that_its_owner_changes_during_the_check_is_played_as_it_was_checked():
     shared = long()
 
-    class Saboteur(Prediction):
+    class Saboteur(FilmForecast):
         def follow(self, start, voltage):
             shared[start : start + voltage.size] = 7e3  # the voltage has been checked by now
             return super().follow(start, voltage)
@@ -212,7 +212,7 @@ def test_a_source_that_gives_another_number_of_samples_is_refused(wrong):
 
 
 def test_a_prediction_that_follows_with_another_number_is_refused():
-    class Short(Prediction):
+    class Short(FilmForecast):
         def follow(self, start, voltage):
             return super().follow(start, voltage)[:-1]
 

@@ -94,3 +94,12 @@ def test_a_probability_is_written_as_far_as_a_number_knows_it():
     assert p_text(0.0213) == "p = 0.02"
     assert p_text(3e-12) == "p = 3e-12"
     assert p_text(0.0) == "p < 1e-15"
+
+
+def test_an_error_that_training_leaves_open_is_said_to_be_so():
+    given = (EXPLAINED, COMPLETE, [1.0], [1.0, 5.0], (3.0, 1.0))
+    plain, open_ = judge(*given), judge(*given, undetermined=True)
+    assert plain == Judgement(PARTLY_EXPLAINED, ("validation",))
+    assert open_ == Judgement(PARTLY_EXPLAINED, ("validation", "excitation"))
+    # without an error above the noise there is nothing to excuse
+    assert judge(EXPLAINED, COMPLETE, [1.0], [1.0], (3.0, 1.0), undetermined=True).reasons == ()

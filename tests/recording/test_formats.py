@@ -13,7 +13,7 @@ import pytest
 from nptdms import ChannelObject, TdmsWriter
 from openpyxl import Workbook
 
-from dearig.drivers.registry import ContractError
+from dearig.drivers.registry import EntryError
 from dearig.errors import InputError
 from dearig.recording import EXPORTS, export_recording, open_recording
 from dearig.recording.exporters import Exporter
@@ -94,7 +94,7 @@ def test_the_importers_contract_finds_a_fault(
 ) -> None:
     (tmp_path / "copies").mkdir()
     sample = sample_of("csv", run, tmp_path)
-    with pytest.raises(ContractError, match=match):
+    with pytest.raises(EntryError, match=match):
         check_importer("csv", replace(IMPORTERS["csv"], **change), sample, tmp_path / "copies")
 
 
@@ -109,7 +109,7 @@ def test_the_exporters_contract_finds_values_that_do_not_come_back(
         return written
 
     monkeypatch.setattr(exporters_contract, "export_recording", rounded)
-    with pytest.raises(ContractError, match="comes back with other values"):
+    with pytest.raises(EntryError, match="comes back with other values"):
         check_exporter("csv", run, tmp_path, now=Clock())
 
 

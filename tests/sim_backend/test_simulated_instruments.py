@@ -8,7 +8,7 @@ import pytest
 from dearig.drivers.errors import RigError
 from dearig.drivers.settings import AmplifierSettings, LaserSettings, RigSettings
 from dearig.sim_backend.amplifier import Amplifier, AmplifierState
-from dearig.sim_backend.card import Card
+from dearig.sim_backend.card import Converters
 from dearig.sim_backend.laser import Laser, _averages
 from dearig.sim_backend.streams import Streams
 
@@ -196,7 +196,7 @@ def test_laser_direction_resolution_range_and_alarm():
 
 
 def test_card_counts_follow_the_scaling_it_tells():
-    card = Card(RigSettings(), Streams((1,)))
+    card = Converters(RigSettings(), Streams((1,)))
     for channel in card.channels[1:]:
         volts = np.linspace(-9.9, 9.9, 1001)
         counts = card.convert(channel.name, volts)
@@ -207,14 +207,15 @@ def test_card_counts_follow_the_scaling_it_tells():
 
 def test_two_cards_are_calibrated_differently_and_one_always_the_same():
     coefficients = [
-        Card(RigSettings(), Streams((seed,))).channels[1].scaling.coefficients for seed in (1, 2, 1)
+        Converters(RigSettings(), Streams((seed,))).channels[1].scaling.coefficients
+        for seed in (1, 2, 1)
     ]
     assert coefficients[0] != coefficients[1]
     assert coefficients[0] == coefficients[2]
 
 
 def test_inputs_saturate():
-    card = Card(RigSettings(), Streams((1,)))
+    card = Converters(RigSettings(), Streams((1,)))
     np.testing.assert_array_equal(
         card.convert("displacement", np.array([-11.0, 11.0])), [-32768, 32767]
     )
@@ -222,18 +223,18 @@ def test_inputs_saturate():
 
 def test_command_goes_out_with_the_amplifiers_offset_taken_off():
     settings = RigSettings(amplifier=AmplifierSettings(offset_V=50.0))
-    card = Card(settings, Streams((1,)))
+    card = Converters(settings, Streams((1,)))
     volts = card.put_out(card.channels[0].scaling.counts(np.array([0.0, 1050.0])))
     np.testing.assert_allclose(volts, [-0.05, 1.0], atol=2e-4)
 
 
 @pytest.mark.parametrize(("rate", "actual"), [(1000.0, 1000.0), (3000.0, 1e8 / 33333)])
 def test_rates_are_divided_from_the_timebase(rate, actual):
-    assert Card(RigSettings(), Streams((1,))).actual_rate(rate) == actual
+    assert Converters(RigSettings(), Streams((1,))).actual_rate(rate) == actual
 
 
 def test_buffer():
-    card = Card(RigSettings(), Streams((1,)))
+    card = Converters(RigSettings(), Streams((1,)))
     card.check_buffer(100_000)
     with pytest.raises(RigError, match=r"100001 samples waited .* holds 100000") as caught:
         card.check_buffer(100_001)

@@ -12,7 +12,7 @@ from dearig.model import kernel
 from dearig.model.diagnosis.fits import Fit
 from dearig.model.effects import EFFECTS, EffectValues
 from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
@@ -81,7 +81,7 @@ def posed(
     model: Actuator, record: Record, fidelity: int = kernel.CAREFUL
 ) -> tuple[Problem, np.ndarray, np.ndarray]:
     """A problem, ``model``'s coordinates (d,) and which are free (d,): all but locking limits."""
-    layout = Layout(model)
+    layout = FitLayout(model)
     free = np.ones(layout.size, dtype=bool)
     free[layout.column("J")] = False
     problem = Problem([record], layout, workers=1, fidelity=fidelity)
@@ -90,7 +90,7 @@ def posed(
 
 def made_fit(records: Several[Record], model: Actuator | Strip, residual: np.ndarray) -> Fit:
     """A fit in which measured less model is ``residual`` (N,), whatever the records say."""
-    layout = Layout(model)
+    layout = FitLayout(model)
     problem = WhitenedProblem(records, layout, workers=1)
     start = layout.coordinates(layout.initial())
     over = np.where(np.isfinite(problem.sigma), -residual / problem.sigma, 0.0)

@@ -38,7 +38,7 @@ from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 from tests.window.real_window import Hand, end, shown, until
 
 RIG = """\
@@ -125,7 +125,7 @@ def play(folder: Path, port: int, picture: str) -> None:
         until(lambda: page.folder == begun, "the campaign is opened")
     else:
         plan = (folder / "plan.toml").read_text("utf-8")
-        page.plan.restore(plan, TextFile("plan", plan, None, folder))
+        page.plan.restore(plan, EditedFile("plan", plan, None, folder))
     first = True
     while page.folder is None or page.queue.waiting or page.queue.running is not None:
         write(controls.operator, "ada")

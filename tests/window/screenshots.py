@@ -30,7 +30,7 @@ from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.recordings.page import RecordingsPage
 from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
 from tests.window.real_window import end
@@ -121,6 +121,14 @@ def views(window: MainWindow) -> Iterator[str]:
     folder = session.folder
     window.show_page(window.page(RigPage))
     yield "rig"
+    rig = window.page(RigPage)
+    rig.instruments.setCurrentWidget(rig.live)
+    rig.live.start()
+    until(lambda: rig.live.table.rowCount() > 0, "the inputs")
+    _work(3000)
+    yield "rig-live"
+    rig.live.stop()
+    rig.instruments.setCurrentIndex(0)
     window.show_page(window.sequence_page)
     yield "sequence"
     planned(session, REFUSED)
@@ -249,7 +257,7 @@ def campaigning(window: MainWindow) -> Iterator[str]:
     example = page.plan.toml
 
     def checked(toml: str) -> None:
-        page.plan.restore(toml, TextFile("plan", toml))
+        page.plan.restore(toml, EditedFile("plan", toml))
         until(lambda: page._survey is not None and not page.surveyor.waits, "the runs of a plan")
 
     checked(example.replace("[7.0, 7.0", "[12.0, 7.0"))

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from PySide6 import QtGui
-from PySide6.QtCore import QAbstractListModel, QPoint, QRect, Qt
+from PySide6.QtCore import QAbstractListModel, QCoreApplication, QEvent, QPoint, QRect, Qt
 from PySide6.QtGui import QFontMetrics, QTextDocument
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -132,8 +132,14 @@ def commands(window: QWidget) -> list[str]:
     )
 
 
+def lay_out() -> None:
+    """Lay out what has changed, as Qt does before it paints: a text may be new at any moment."""
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+
+
 def overlapping(window: QWidget) -> list[str]:
     """Return the pairs of labels, buttons and fields that cover a part of each other."""
+    lay_out()
     kinds = (QLabel, QAbstractButton, QLineEdit, QComboBox, QAbstractSpinBox, QProgressBar)
     placed: list[tuple[QWidget, QRect]] = []
     for widget in window.findChildren(QWidget):
@@ -161,6 +167,7 @@ def _named(widget: QWidget) -> str:
 
 def cut_off(window: QWidget) -> list[str]:
     """Return the texts that do not fit into the widgets that are shown."""
+    lay_out()
     found = []
     for widget in window.findChildren(QWidget):
         if not widget.isVisible() or widget.width() == 0:

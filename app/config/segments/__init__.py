@@ -17,14 +17,14 @@ __all__ = ["SEGMENT_KINDS", "Positive", "SegmentTable", "Voltage"]
 
 _OWN = MappingProxyType(
     {
-        "half_sine": "dearig.config.segments.lobes:HalfSine",
-        "sine": "dearig.config.segments.sine:Sine",
-        "triangle": "dearig.config.segments.lobes:Triangle",
-        "ramp": "dearig.config.segments.levels:Ramp",
-        "hold": "dearig.config.segments.levels:Hold",
-        "chirp": "dearig.config.segments.chirp:Chirp",
-        "steps": "dearig.config.segments.levels:Steps",
-        "multisine": "dearig.config.segments.multisine:Multisine",
+        "half_sine": "dearig.config.segments.lobes:HalfSineSegment",
+        "sine": "dearig.config.segments.sine:SineSegment",
+        "triangle": "dearig.config.segments.lobes:TriangleSegment",
+        "ramp": "dearig.config.segments.levels:RampSegment",
+        "hold": "dearig.config.segments.levels:HoldSegment",
+        "chirp": "dearig.config.segments.chirp:ChirpSegment",
+        "steps": "dearig.config.segments.levels:StepsSegment",
+        "multisine": "dearig.config.segments.multisine:MultisineSegment",
         "thesis": "dearig.config.segments.lobes:Thesis",
         "csv": "dearig.config.segments.waveform:Csv",
     }

@@ -11,10 +11,10 @@ from dearig.config.segments.base import KV, Positive, SegmentTable, Voltage, in_
 from dearig.model.simulation import excitation
 from dearig.model.simulation.excitation import Segment
 
-__all__ = ["Chirp"]
+__all__ = ["ChirpSegment"]
 
 
-class Chirp(SegmentTable):
+class ChirpSegment(SegmentTable):
     """A sine about an offset whose frequency sweeps from one value to another."""
 
     example: ClassVar[dict[str, Any]] = {

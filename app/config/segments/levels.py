@@ -11,10 +11,10 @@ from dearig.config.segments.base import KV, Positive, SegmentTable, Voltage, in_
 from dearig.model.simulation import excitation
 from dearig.model.simulation.excitation import Segment
 
-__all__ = ["Hold", "Ramp", "Steps"]
+__all__ = ["HoldSegment", "RampSegment", "StepsSegment"]
 
 
-class Ramp(SegmentTable):
+class RampSegment(SegmentTable):
     """A straight line from one voltage to another."""
 
     example: ClassVar[dict[str, Any]] = {"to_kV": 0.0, "duration_s": 1.0}
@@ -31,7 +31,7 @@ class Ramp(SegmentTable):
         return excitation.Ramp(self.to_kV * KV, self.duration_s, in_volts(self.from_kV))
 
 
-class Hold(SegmentTable):
+class HoldSegment(SegmentTable):
     """One voltage for some time."""
 
     example: ClassVar[dict[str, Any]] = {"duration_s": 1.0}
@@ -47,7 +47,7 @@ class Hold(SegmentTable):
         return excitation.Hold(self.duration_s, in_volts(self.voltage_kV))
 
 
-class Steps(SegmentTable):
+class StepsSegment(SegmentTable):
     """A staircase: each level is reached by a short ramp and held."""
 
     example: ClassVar[dict[str, Any]] = {

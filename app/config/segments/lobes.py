@@ -11,10 +11,10 @@ from dearig.config.segments.base import KV, Positive, SegmentTable, Voltage
 from dearig.model.simulation import excitation
 from dearig.model.simulation.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES, Segment
 
-__all__ = ["HalfSine", "Thesis", "Triangle"]
+__all__ = ["HalfSineSegment", "Thesis", "TriangleSegment"]
 
 
-class HalfSine(SegmentTable):
+class HalfSineSegment(SegmentTable):
     """One unipolar lobe: the positive half of a sine."""
 
     example: ClassVar[dict[str, Any]] = {"amplitude_kV": 6.0, "frequency_Hz": 0.5}
@@ -33,7 +33,7 @@ class HalfSine(SegmentTable):
         return excitation.HalfSine(self.amplitude_kV * KV, self.frequency_Hz)
 
 
-class Triangle(SegmentTable):
+class TriangleSegment(SegmentTable):
     """From 0 kV to the amplitude and back, both ways at one slope."""
 
     example: ClassVar[dict[str, Any]] = {"amplitude_kV": 6.0, "frequency_Hz": 0.5}

@@ -11,10 +11,10 @@ from dearig.config.segments.base import KV, Positive, SegmentTable, Voltage, in_
 from dearig.model.simulation import excitation
 from dearig.model.simulation.excitation import Segment
 
-__all__ = ["Multisine"]
+__all__ = ["MultisineSegment"]
 
 
-class Multisine(SegmentTable):
+class MultisineSegment(SegmentTable):
     """Several simultaneous sines about an offset, with phases that keep the peak low."""
 
     example: ClassVar[dict[str, Any]] = {

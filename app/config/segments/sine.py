@@ -12,10 +12,10 @@ from dearig.config.segments.base import KV, Positive, SegmentTable, Voltage
 from dearig.model.simulation import excitation
 from dearig.model.simulation.excitation import Segment
 
-__all__ = ["Sine"]
+__all__ = ["SineSegment"]
 
 
-class Sine(SegmentTable):
+class SineSegment(SegmentTable):
     """A sine about an offset."""
 
     # from its least value, 0 kV: it joins a segment that ends at 0 kV and never becomes negative

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import shutil
-import subprocess
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -16,17 +12,14 @@ import numpy as np
 from dearig.recording.content.layout import iso_time
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.text import fixed, put_text, text_of
+from dearig.revision import revision, version
 
 __all__ = [
     "CONTINUES",
     "gather",
-    "git_revision",
-    "installed_version",
     "read_provenance",
     "write_provenance",
 ]
-
-ROOT = Path(__file__).resolve().parents[3]
 
 #: Name of the text with the path of the recording that a recording continues. It has no lead-in:
 #: its displacement is counted from that of the other.
@@ -36,31 +29,6 @@ CONTINUES = "continues"
 LONGEST_ATTRIBUTE = 1000
 
 
-def git_revision(root: Path = ROOT) -> str:
-    """Return the git revision at ``root``, with ``-dirty`` if files changed; "" if none."""
-    git = shutil.which("git")
-    # git would also find the repository of a parent folder, which is not that of this program
-    if git is None or not (root / ".git").exists():
-        return ""
-    command = [git, "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40"]
-    command += ["--exclude=*"]
-    try:
-        answer = subprocess.run(  # noqa: S603  (fixed arguments, no shell)
-            command, capture_output=True, text=True, timeout=5.0, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return answer.stdout.strip() if answer.returncode == 0 else ""
-
-
-def installed_version() -> str:
-    """Return the version of the installed package, "unknown" where it is not installed."""
-    try:
-        return version("dearig")
-    except PackageNotFoundError:
-        return "unknown"
-
-
 def gather(started: float, metadata: RunMetadata) -> dict[str, object]:
     """Return the provenance of a recording that was started at the Unix time ``started`` in s."""
     found: dict[str, object] = {
@@ -68,8 +36,8 @@ def gather(started: float, metadata: RunMetadata) -> dict[str, object]:
         "operator": metadata.operator,
         "host": platform.node(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "dearig_version": installed_version(),
-        "git_revision": git_revision(),
+        "dearig_version": version(),
+        "git_revision": revision().commit,
         "python_version": platform.python_version(),
         "numpy_version": np.__version__,
         "h5py_version": h5py.__version__,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.drivers.registry import ContractError
+from dearig.drivers.registry import EntryError
 from dearig.recording.exporters import export_recording
 from dearig.recording.exporters.table import columns_of
 from dearig.recording.importers import IMPORTERS, import_file
@@ -27,30 +27,30 @@ def check_exporter(
 
     ``recording`` is a recording that is exported, ``folder`` an empty folder. Where an importer
     takes the suffix, what was exported is imported again and every value compared, to the last
-    bit. Raises ``ContractError`` with a sentence for the first thing that is wrong.
+    bit. Raises ``EntryError`` with a sentence for the first thing that is wrong.
     """
     before = recording.read_bytes()
     out = export_recording(recording, name, folder / f"exported.{name}")
     if [path.name for path in folder.iterdir()] != [out.name]:
-        raise ContractError(f"{name}: it writes other files than the one asked for")
+        raise EntryError(f"{name}: it writes other files than the one asked for")
     if not out.stat().st_size:
-        raise ContractError(f"{name}: it writes nothing")
+        raise EntryError(f"{name}: it writes nothing")
     if recording.read_bytes() != before:
-        raise ContractError(f"{name}: it changes the recording")
+        raise EntryError(f"{name}: it changes the recording")
     if not any(f".{name}" in importer.suffixes for importer in IMPORTERS.values()):
         return
     again = folder / "again.h5"
     import_file(out, again, now=now)
     first, second = open_recording(recording), open_recording(again)
     if second.kind != first.kind:
-        raise ContractError(f"{name}: a recording of kind {first.kind} comes back as {second.kind}")
+        raise EntryError(f"{name}: a recording of kind {first.kind} comes back as {second.kind}")
     values, imported = columns_of(first), columns_of(second)
     for column in values:
         if column.startswith(_NOT_IMPORTED):
             continue
         if column not in imported:
-            raise ContractError(f"{name}: the column {column} does not come back")
+            raise EntryError(f"{name}: the column {column} does not come back")
         # an import subtracts the rest from the displacement again, which is 0 within rounding
         atol = 1e-15 if column.startswith("displacement") else 0.0
         if not np.allclose(values[column], imported[column], rtol=0.0, atol=atol):
-            raise ContractError(f"{name}: the column {column} comes back with other values")
+            raise EntryError(f"{name}: the column {column} comes back with other values")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.drivers.registry import ContractError
+from dearig.drivers.registry import EntryError
 from dearig.errors import InputError
 from dearig.recording.importers.importer import HEAD_BYTES, Importer
 from dearig.recording.importers.source import Source
@@ -21,16 +21,16 @@ def check_importer(name: str, importer: Importer, sample: Path, folder: Path) ->
     """Check that ``importer`` does what every importer must do.
 
     ``name`` is its name in the registry, ``sample`` a sound file of its format with at least one
-    column, ``folder`` an empty folder for damaged copies. Raises ``ContractError`` with a sentence
+    column, ``folder`` an empty folder for damaged copies. Raises ``EntryError`` with a sentence
     for the first thing that is wrong.
     """
     content = sample.read_bytes()
     if sample.suffix.lower() not in importer.suffixes:
-        raise ContractError(f"{name}: {sample.name} has none of its suffixes {importer.suffixes}")
+        raise EntryError(f"{name}: {sample.name} has none of its suffixes {importer.suffixes}")
     _check_sniff(name, importer, content)
     _check_source(name, importer.open(sample), sample)
     if sample.read_bytes() != content:
-        raise ContractError(f"{name}: it changes the file that it reads")
+        raise EntryError(f"{name}: it changes the file that it reads")
     for kept in _KEPT:
         damaged = folder / f"damaged{sample.suffix}"
         damaged.write_bytes(content[: int(kept * len(content))])
@@ -40,38 +40,38 @@ def check_importer(name: str, importer: Importer, sample: Path, folder: Path) ->
 
 def _check_sniff(name: str, importer: Importer, content: bytes) -> None:
     if not importer.sniff(content[:HEAD_BYTES]):
-        raise ContractError(f"{name}: sniff() does not recognise the sample")
+        raise EntryError(f"{name}: sniff() does not recognise the sample")
     for what, head in (("an empty file", b""), ("zeros", bytes(HEAD_BYTES)), ("text", b"abc\n")):
         if importer.sniff(head):
-            raise ContractError(f"{name}: sniff() takes {what} for its format")
+            raise EntryError(f"{name}: sniff() takes {what} for its format")
 
 
 def _check_source(name: str, source: Source, path: Path) -> None:
     names = list(source.names)
     if source.path != path:
-        raise ContractError(f"{name}: the source has the path {source.path}, not {path}")
+        raise EntryError(f"{name}: the source has the path {source.path}, not {path}")
     if not names or not all(isinstance(n, str) and n.isprintable() for n in names):
-        raise ContractError(f"{name}: the columns {names} must have printable names")
+        raise EntryError(f"{name}: the columns {names} must have printable names")
     columns = source.read(names)
     for column in names:
         source.check(column)
         values = columns[column]
         if values.ndim != 1 or values.dtype != np.float64 or values.size == 0:
-            raise ContractError(
+            raise EntryError(
                 f"{name}: column {column!r} is {values.dtype} {values.shape}, not float64 (n,)"
             )
         if not set(source.named(column)) <= set(names):
-            raise ContractError(f"{name}: named({column!r}) returns columns that do not exist")
+            raise EntryError(f"{name}: named({column!r}) returns columns that do not exist")
         if not source.row(0):
-            raise ContractError(f"{name}: row(0) does not say where the first sample is")
+            raise EntryError(f"{name}: row(0) does not say where the first sample is")
     absent = "no such column"
     if source.named(absent):
-        raise ContractError(f"{name}: named({absent!r}) finds a column")
+        raise EntryError(f"{name}: named({absent!r}) finds a column")
     try:
         source.check(absent)
     except InputError:
         return
-    raise ContractError(f"{name}: check({absent!r}) raises no InputError")
+    raise EntryError(f"{name}: check({absent!r}) raises no InputError")
 
 
 def _check_damaged(name: str, importer: Importer, path: Path, what: str) -> None:
@@ -82,6 +82,6 @@ def _check_damaged(name: str, importer: Importer, path: Path, what: str) -> None
     except InputError:
         return
     except Exception as error:
-        raise ContractError(f"{name}: {what} raises {type(error).__name__}: {error}") from error
+        raise EntryError(f"{name}: {what} raises {type(error).__name__}: {error}") from error
     if not path.exists():
-        raise ContractError(f"{name}: {what} raises no InputError")
+        raise EntryError(f"{name}: {what} raises no InputError")

@@ -29,7 +29,7 @@ from dearig.recording.importers.columns.proposal import first_values
 from dearig.recording.importers.columns.specimen import Specimen
 from dearig.recording.importers.columns.values import Values, values_of
 from dearig.recording.importers.exported import exported
-from dearig.recording.importers.quantities.units import Scale
+from dearig.recording.importers.quantities.units import UnitScale
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import NeedsOptionError
 from dearig.recording.writing.save import save_recording
@@ -87,7 +87,7 @@ class ImportOptions:
     rate_Hz: float | None = None
     names_line: int | None = None
     skip_bad_rows: bool = False
-    raw: Mapping[str, Scale] = field(default_factory=dict)
+    raw: Mapping[str, UnitScale] = field(default_factory=dict)
     table: str | None = None
     guess: bool = True
     typed: tuple[tuple[str, str | float], ...] = ()

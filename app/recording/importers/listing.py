@@ -16,9 +16,9 @@ from dearig.progress import Progress, part, quiet
 from dearig.recording.importers.columns.choose import choose
 from dearig.recording.importers.columns.chosen import Chosen, label_in, own_name
 from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
-from dearig.recording.importers.formats.columns import Overview
+from dearig.recording.importers.formats.columns import ColumnOverview
 from dearig.recording.importers.importing import OPENED
-from dearig.recording.importers.quantities.units import Scale
+from dearig.recording.importers.quantities.units import UnitScale
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import Source, part_of, printable
 
@@ -102,7 +102,7 @@ def preview(path: Path, names_line: int | None = None) -> list[ColumnPreview]:
 def content_of(
     path: Path,
     names_line: int | None = None,
-    raw: Mapping[str, Scale] | None = None,
+    raw: Mapping[str, UnitScale] | None = None,
     *,
     shown: int = 12,
     progress: Progress = quiet,
@@ -133,7 +133,7 @@ def content_of(
     )  # fmt: skip
 
 
-def _taken(source: Source, raw: Mapping[str, Scale]) -> str | None:
+def _taken(source: Source, raw: Mapping[str, UnitScale]) -> str | None:
     """Return the table that is taken without being asked, "" for all columns; else None."""
     try:
         chosen = choose(source, {}, raw, timed=False)
@@ -143,7 +143,7 @@ def _taken(source: Source, raw: Mapping[str, Scale]) -> str | None:
 
 
 def _proposal(
-    source: Source, table: str | None, raw: Mapping[str, Scale], numbers: Mapping[str, int]
+    source: Source, table: str | None, raw: Mapping[str, UnitScale], numbers: Mapping[str, int]
 ) -> ColumnGuesses:
     tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
     names = list(source.names if table is None else tables[table])
@@ -213,11 +213,11 @@ def _columns(source: Source, shown: int) -> list[ColumnPreview]:
     return found
 
 
-def _overviews(source: Source, names: Sequence[str], shown: int) -> dict[str, Overview]:
+def _overviews(source: Source, names: Sequence[str], shown: int) -> dict[str, ColumnOverview]:
     """Return first values, number and range of each column; none where it cannot be read."""
     whole = getattr(source, "overview", None)
     if whole is not None:
-        told: dict[str, Overview] = whole(names, shown)
+        told: dict[str, ColumnOverview] = whole(names, shown)
         return told
     found = {}
     for name in names:
@@ -225,6 +225,6 @@ def _overviews(source: Source, names: Sequence[str], shown: int) -> dict[str, Ov
             values = source.read([name])[name]
         except InputError:
             values = np.empty(0)
-        seen = Overview().with_values(values[np.isfinite(values)], shown)
+        seen = ColumnOverview().with_values(values[np.isfinite(values)], shown)
         found[name] = replace(seen, first=values[:shown], count=int(values.size))
     return found

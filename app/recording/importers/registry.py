@@ -28,6 +28,20 @@ _OWN = MappingProxyType(
     }
 )
 
+#: First bytes of formats that are known and not read: what each is, and what leads on.
+_NOT_READ = (
+    (b"MDF     ", "an MDF measurement file", "export the signals as CSV or MAT, with asammdf say"),
+    (b"UnFinMF ", "an unfinished MDF file", "export the signals as CSV or MAT, with asammdf say"),
+    (b"SQLite format 3\0", "an SQLite database", "export the run as CSV or netCDF (QCoDeS does)"),
+    (b"CDF\x01", "a netCDF file of the classic format", "nccopy -k nc4 makes an HDF5 file of it"),
+    (b"CDF\x02", "a netCDF file of the classic format", "nccopy -k nc4 makes an HDF5 file of it"),
+    (b"\x93NUMPY", "a NumPy array", "it has no names: save the columns as CSV or HDF5"),
+    (b"\x1f\x8b", "compressed (gzip)", "unpack it first"),
+    (b"BZh91AY&SY", "compressed (bzip2)", "unpack it first"),
+    (b"\xfd7zXZ", "compressed (xz)", "unpack it first"),
+    (b"7z\xbc\xaf", "an archive (7-Zip)", "unpack it first"),
+)
+
 
 def _check(name: str, importer: Any) -> None:  # noqa: ARG001  (one signature for all registries)
     """Raise an error with a sentence unless ``importer`` can be used."""
@@ -59,6 +73,9 @@ def source_at(path: Path, **options: object) -> Source:
         raise InputError(f"{path} cannot be read: {in_words(error)}") from error
     if not head:
         raise InputError(f"{path} is empty")
+    for first, what, remedy in _NOT_READ:
+        if head.startswith(first):
+            raise InputError(f"{path} is {what}, which is not read: {remedy}")
     suffix = path.suffix.lower()
     named = [importer for importer in IMPORTERS.values() if suffix in importer.suffixes]
     others = [importer for importer in IMPORTERS.values() if importer not in named]

@@ -11,7 +11,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.springs import LIMIT, SPRING_LAWS
 from dearig.report.text.laws import other_symbols, parameter_meanings
-from dearig.report.text.numbers import quoted, significant
+from dearig.report.text.numbers import interval_ends, quoted, significant
 
 __all__ = ["latex_page"]
 
@@ -156,7 +156,7 @@ def _row(symbol: str, value: float, unit: str, interval: tuple[Any, Any] | None)
     low = -math.inf if interval[0] is None else float(interval[0])
     high = math.inf if interval[1] is None else float(interval[1])
     shown = _math(quoted(value, low, high))
-    ends = f"[{_math(significant(low, 4))}, {_math(significant(high, 4))}]"
+    ends = f"[{', '.join(map(_math, interval_ends(low, high)))}]"
     return rf"${symbol}$ & {shown} & {unit} & {ends} \\"
 
 

@@ -9,11 +9,11 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dearig.command_line import without_secrets
+from dearig.revision import revision, version
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import Comparison
@@ -65,14 +65,10 @@ def head_of(origins: Iterable[Origin], rows: Sequence[tuple[str, Sequence[str]]]
     ``rows`` are names with values that replace those of the recordings, such as a film that is
     known from elsewhere, or follow them.
     """
-    from dearig.recording.content.provenance import installed_version  # imports h5py
-
     origins = tuple(dict.fromkeys(origins))
-    revision = _revision() or NOT_RECORDED
     given = {name: tuple(values) for name, values in rows}
     found: dict[str, tuple[str, ...]] = {
-        "Program": (f"dearig {installed_version()}",),
-        "Revision": (revision,),
+        "Program": (f"dearig {revision().text(version())}",),
         "Report made": (datetime.now().astimezone().isoformat(" ", timespec="seconds"),),
         "Command": (command_line(),),
         "Film": _distinct(origins, lambda o: o.film),
@@ -149,11 +145,3 @@ def _about(origin: Origin) -> str:
     seed = "" if origin.seed is None else f"noise seed {origin.seed}"
     words = [kind, origin.source, seed, origin.started]
     return ", ".join(word for word in words if word) or f"source {NOT_RECORDED}"
-
-
-@cache
-def _revision() -> str:
-    """Return the git revision; asked once in a process, as it starts another one."""
-    from dearig.recording.content.provenance import git_revision
-
-    return git_revision()

@@ -11,6 +11,7 @@ import numpy as np
 
 from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
 from dearig.model.verdict import NOT_CONFIRMED, TOLERANCE
+from dearig.report.text.excitation import tested_texts, undetermined_texts
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
 from dearig.report.text.sentences import few_data_text, listed, undetermined_names_text
 from dearig.report.text.tables import Row, Table
@@ -49,6 +50,7 @@ HEADLINES = {
     "unexplained": "Residual not explained by any known effect",
 }
 _LOWERED = {
+    "excitation": "Not determined by these recordings: validation asks for what training lacks",
     "validation": "Training recordings explained, validation recordings not",
     "selection": "Residual partly explained: the cross-validation error rises",
     "training": "Residual partly explained: one training recording keeps more than noise",
@@ -122,9 +124,6 @@ def _as_tabled(
     return tuple(told)
 
 
-# sentences
-
-
 def headline(outcome: DiagnoseOutcome) -> str:
     """Return the headline: the verdict with the limits of what it rests on."""
     finding, judgement = outcome.finding, outcome.judgement
@@ -181,6 +180,7 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     ):  # fmt: skip
         if before and after:
             said.append(_error_change(role, before, after, outcome, bool(finding.steps)))
+    said += tested_texts(outcome)
     if not outcome.after.validation:
         said.append(
             "No validation recordings were given: the errors do not show how well the model "
@@ -223,6 +223,7 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
             f"The model explains the training recordings, but not the validation recordings: "
             f"{listed(left)}."
         )
+        yield from undetermined_texts(outcome)
     elif outcome.prediction_errors and any(
         c.over_noise(outcome.noise) > TOLERANCE for c in outcome.after.validation
     ):
@@ -412,9 +413,6 @@ def warnings(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     for comparison in (*outcome.after.train, *outcome.after.validation):
         said += [f"{comparison.name}: {w}" for w in comparison.warnings]
     return tuple(dict.fromkeys(readable(_sentence(w)) for w in said))
-
-
-# tables
 
 
 def _pairs(

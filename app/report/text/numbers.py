@@ -10,6 +10,7 @@ from dearig.formulas import ASCII
 __all__ = [
     "NO_VALUE",
     "interval",
+    "interval_ends",
     "power_of_ten",
     "quoted",
     "seconds",
@@ -44,7 +45,8 @@ _PLAIN = str.maketrans(
     }
 )
 _NAMED = re.compile(r"(mu|alpha|beta|share|c2|c3|J|T)_(\d+)")
-_DIGITS_MAX = 6  # significant digits of a value
+_DIGITS_MAX = 12  # significant digits of a value: a fit in double precision supports no more
+_PLAIN_FROM, _PLAIN_TO = 1e-4, 1e6  # numbers outside are written with a power of ten
 _WIDE = 5.0  # ratio of its ends above which an interval gives no digits
 
 
@@ -82,6 +84,15 @@ def _decimals(value: float, width: float) -> int:
     return decimals
 
 
+def _rounded(value: float, decimals: int, scale: float) -> str:
+    """Round ``value`` to ``decimals``, as a power of ten where ``scale`` is far from 1."""
+    if _PLAIN_FROM < abs(scale) < _PLAIN_TO:
+        return _fixed(value, decimals)
+    exponent = math.floor(math.log10(abs(scale)))
+    mantissa = _fixed(value / 10.0**exponent, max(decimals + exponent, 0))
+    return f"{mantissa} {_TIMES} {power_of_ten(exponent)}"
+
+
 def _tolerance(low: float, high: float) -> float | None:
     """Return half the width of an interval; None if it is open, wide, or a point."""
     if not (math.isfinite(low) and math.isfinite(high)) or high <= low:
@@ -94,9 +105,20 @@ def _tolerance(low: float, high: float) -> float | None:
 def quoted(value: float, low: float, high: float) -> str:
     """Return ``value`` with the digits that its 95 % interval ``low`` .. ``high`` supports."""
     width = _tolerance(low, high)
-    if width is None or not math.isfinite(value) or not 1e-4 < abs(value) < 1e6:
+    if width is None or not math.isfinite(value) or value == 0.0:
         return significant(value, 5 if low == high else 2)
-    return _fixed(value, _decimals(value, width))
+    return _rounded(value, _decimals(value, width), value)
+
+
+def interval_ends(low: float, high: float) -> tuple[str, str]:
+    """Return both ends of an interval with the digits that it supports."""
+    width = _tolerance(low, high)
+    if width is None:
+        digits = 5 if low == high else 2
+        return significant(low, digits), significant(high, digits)
+    scale = max(abs(low), abs(high))
+    decimals = _decimals(scale, width)
+    return _rounded(low, decimals, scale), _rounded(high, decimals, scale)
 
 
 def interval(low: float, high: float) -> str:
@@ -107,11 +129,7 @@ def interval(low: float, high: float) -> str:
         return f"above {significant(low, 2)}"
     if low == 0.0:
         return f"below {significant(high, 2)}"
-    width = _tolerance(low, high)
-    if width is None or not 1e-4 < max(abs(low), abs(high)) < 1e6:
-        return f"{significant(low, 2)} to {significant(high, 2)}"
-    decimals = _decimals(max(abs(low), abs(high)), width)
-    return f"{_fixed(low, decimals)} to {_fixed(high, decimals)}"
+    return " to ".join(interval_ends(low, high))
 
 
 def seconds(duration: float) -> str:

@@ -13,7 +13,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from dearig.acquisition.interrupts import Interrupts
-from dearig.batch.after import Computed, compute
+from dearig.batch.after import AfterRun, compute
 from dearig.config.campaignfile import Campaign, load_campaign
 from dearig.config.rigfile import RigFile
 from dearig.drivers.processes.children import isolated_spawn
@@ -46,10 +46,10 @@ class ComputeProcess:
         last_model: str,
         rig_file: RigFile,
         progress: Progress = quiet,
-    ) -> Computed:
+    ) -> AfterRun:
         """Compute as ``compute``; an error of the program is a problem that is noted."""
         if not (campaign.identify or campaign.validate or campaign.diagnose):
-            return Computed()
+            return AfterRun()
         connection = self._started()
         self._number += 1
         given = (campaign.folder, recording, folder, last_model, rig_file)
@@ -67,14 +67,14 @@ class ComputeProcess:
         except (EOFError, OSError):
             self.close()
             log.exception("the process that computes after a run has ended")
-            return Computed(problems=["the computation ended unexpectedly; the log has details"])
+            return AfterRun(problems=["the computation ended unexpectedly; the log has details"])
         if answer.kind == "done":
-            found: Computed = answer.value
+            found: AfterRun = answer.value
             return found
         words, trace = answer.value if answer.kind == "broken" else (str(answer.value), "")
         if trace:
             log.error("%s", words, exc_info=ErrorInProcess(trace))
-        return Computed(problems=[words])
+        return AfterRun(problems=[words])
 
     def close(self) -> None:
         """End the process, and wait for it."""
@@ -109,7 +109,7 @@ def compute_of_folder(
     last_model: str,
     rig_file: RigFile,
     progress: Progress = quiet,
-) -> Computed:
+) -> AfterRun:
     """Compute as ``compute`` does for the campaign in ``folder``, whose plan is a copy there.
 
     A plan cannot be sent from one process to another. Files that it names are in ``plan_folder``.

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QProgressBar,
     QSpinBox,
@@ -22,7 +21,7 @@ from dearig.batch.campaign import Arming
 from dearig.config.campaignfile import RUNS_MAX
 from dearig.window.high_voltage.status import HighVoltageStatus
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import Message, Readout, button, card, label
+from dearig.window.kit.widgets import ElidedLabel, Message, Readout, button, card, label
 from dearig.window.run.controls import StepButton
 from dearig.window.run.live import RunSnapshot
 
@@ -181,7 +180,7 @@ class CampaignControls(QWidget):
         return self._halted
 
     def _present_row(self) -> QGridLayout:
-        self.present: QLabel = label("", "heading")
+        self.present = ElidedLabel("heading")
         self.time_left = label("", "muted")
         self.progress = QProgressBar()
         self.progress.setRange(0, 1000)

@@ -51,7 +51,7 @@ from dearig.window.run.runner import Play, RunEnd, Runner
 from dearig.window.session.layout_state import remember
 from dearig.window.session.page import Page, Pages
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["CampaignPage"]
 
@@ -114,7 +114,7 @@ class CampaignPage(Page):
         page.watch_run.connect(run.watch)
         return page
 
-    def restore(self, text: str, file: TextFile) -> None:
+    def restore(self, text: str, file: EditedFile) -> None:
         """Replace the plan by the unsaved one of an earlier window."""
         self.plan.restore(text, file)
 
@@ -288,7 +288,8 @@ class CampaignPage(Page):
         self.controls.forget_proposal()
         self._sizes = {}
         self.plan.restore(
-            found.toml, TextFile("plan", found.toml, found.folder / "plan.toml", found.plan_folder)
+            found.toml,
+            EditedFile("plan", found.toml, found.folder / "plan.toml", found.plan_folder),
         )
         self._show_queue()
 
@@ -349,13 +350,13 @@ class CampaignPage(Page):
     def _show_present(self) -> None:
         run, stage = self._queue.running, self._stage
         if self._thread is None:
-            self.controls.present.setText("")
+            self.controls.present.show_text("")
         elif run is not None and self._runner.status.state is HighVoltage.UNKNOWN:
-            self.controls.present.setText(f"{run.name} · the output is unknown, the run is ending")
+            self.controls.present.show_text(f"Output unknown, the run is ending · {run.name}")
         elif run is not None:
-            self.controls.present.setText(f"{run.name} · {stage.partition(', ')[2] or stage}")
+            self.controls.present.show_text(f"{run.name} · {stage.partition(', ')[2] or stage}")
         else:
-            self.controls.present.setText(stage[:1].upper() + stage[1:])
+            self.controls.present.show_text(stage[:1].upper() + stage[1:])
 
     @Slot(object)
     def _ended(self, end: RunEnd) -> None:
@@ -391,7 +392,7 @@ class CampaignPage(Page):
         survey = self._survey
         if survey is not None and self._folder is not None:
             toml, path = survey.request.toml, self._folder / "plan.toml"
-            self.plan.restore(toml, TextFile("plan", toml, path, survey.request.folder))
+            self.plan.restore(toml, EditedFile("plan", toml, path, survey.request.folder))
 
     # buttons
 
@@ -441,7 +442,7 @@ class CampaignPage(Page):
         self.message.show_text("")
         self.controls.forget_proposal()
         self.controls.show_numbers(None)
-        self.plan.restore(toml, TextFile("plan", toml, None, survey_folder))
+        self.plan.restore(toml, EditedFile("plan", toml, None, survey_folder))
 
     @Slot()
     def _ask_open(self) -> None:

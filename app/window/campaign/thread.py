@@ -82,9 +82,9 @@ class CampaignThread(PlayThread):
         try:
             play_campaign(
                 request.campaign, request.address, request.rig_file, request.folder,
-                request.options, request.arming, resume=request.resume, observer=LiveObserver(self),
-                ended=outcome.append, noted=self._note, interrupts=self.interrupts,
-                computing=computing, progress=self._progress,
+                request.options, request.arming, resume=request.resume,
+                observer=CampaignObserver(self), ended=outcome.append, noted=self._note,
+                interrupts=self.interrupts, computing=computing, progress=self._progress,
             )  # fmt: skip
         except DearigError as error:
             self.end = self._early_end(error, outcome[-1] if outcome else None)
@@ -151,7 +151,7 @@ def _left(outcome: CampaignOutcome) -> str:
     return f"{left} run{'s wait' if left > 1 else ' waits'}; arm and start again to go on"
 
 
-class LiveObserver(RunObserver):
+class CampaignObserver(RunObserver):
     """Hands what comes from each run to a ``Live`` of its own."""
 
     def __init__(self, thread: CampaignThread) -> None:

@@ -14,7 +14,7 @@ from dearig.window.documents.questions import confirm_discard, replace_or_tell
 from dearig.window.jobs.background import Background
 from dearig.window.kit.widgets import Message, label
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import OverwriteQuestion, Saved, TextFile
+from dearig.window.session.text_file import EditedFile, OverwriteQuestion, Saved
 
 __all__ = ["FileActions"]
 
@@ -27,7 +27,7 @@ class FileActions(QObject):
     """
 
     chosen = Signal(Path)  #: a file to open, from the dialog
-    opened = Signal(str, TextFile)  #: a text that was read, and its file
+    opened = Signal(str, EditedFile)  #: a text that was read, and its file
     saved = Signal(Saved)  #: a text that is in its file now
 
     def __init__(
@@ -35,7 +35,7 @@ class FileActions(QObject):
         parent: QWidget,
         session: Session,
         what: str,
-        current: Callable[[], tuple[str, TextFile]],
+        current: Callable[[], tuple[str, EditedFile]],
         kinds: str = "",
     ) -> None:
         """``what`` is edited ("rig file"); ``kinds`` are the files to open, TOML by default."""
@@ -120,4 +120,4 @@ class FileActions(QObject):
             self._session.message.emit(f"Saved {answer.path}")
         else:
             path, text = answer
-            self.opened.emit(text, TextFile(self._what, text, path, path.parent))
+            self.opened.emit(text, EditedFile(self._what, text, path, path.parent))

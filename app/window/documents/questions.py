@@ -10,12 +10,12 @@ from PySide6.QtWidgets import QWidget
 from dearig.window.documents.dialogs import ask
 from dearig.window.kit.widgets import Message
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import OverwriteQuestion, TextFile
+from dearig.window.session.text_file import EditedFile, OverwriteQuestion
 
 __all__ = ["confirm_discard", "may_close", "offer_unsaved", "replace_or_tell"]
 
 
-def confirm_discard(parent: QWidget, session: Session, file: TextFile, text: str) -> bool:
+def confirm_discard(parent: QWidget, session: Session, file: EditedFile, text: str) -> bool:
     """Return True if ``text`` has no unsaved changes, or the operator gives them up."""
     return not file.is_unsaved(text) or ask(
         parent,
@@ -67,7 +67,7 @@ def replace_or_tell(
 
 
 def offer_unsaved(
-    parent: QWidget, session: Session, restore: Mapping[str, Callable[[str, TextFile], None]]
+    parent: QWidget, session: Session, restore: Mapping[str, Callable[[str, EditedFile], None]]
 ) -> None:
     """Offer the unsaved texts of windows that ended without a question, and restore them.
 

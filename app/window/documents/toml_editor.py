@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QVBoxLayout, QWidget
 from dearig.window.documents.file_actions import FileActions
 from dearig.window.kit.widgets import button, label
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["EditorWords", "TomlEditor"]
 
@@ -47,7 +47,7 @@ class TomlEditor(QWidget):
         lines = example.splitlines(keepends=True)
         example = "".join(line for line in lines if not line.lstrip("# ").startswith("dearig "))
         self._text_of_example = example
-        self._file = TextFile(words.what, example)
+        self._file = EditedFile(words.what, example)
         self.files = FileActions(
             self, session, words.what, lambda: (self.toml, self._file), words.kinds
         )
@@ -96,7 +96,7 @@ class TomlEditor(QWidget):
         """Read the file ``path``."""
         self.files.open(path)
 
-    def restore(self, toml: str, file: TextFile) -> None:
+    def restore(self, toml: str, file: EditedFile) -> None:
         """Replace the text by ``toml`` of ``file``."""
         self._file = file
         self.edit.setPlainText(toml)
@@ -114,4 +114,4 @@ class TomlEditor(QWidget):
     @Slot()
     def _example(self) -> None:
         if self.files.confirm_discard():
-            self.restore(self._text_of_example, TextFile(self.words.what, self._text_of_example))
+            self.restore(self._text_of_example, EditedFile(self.words.what, self._text_of_example))

@@ -58,7 +58,7 @@ from dearig.window.run.page import RunPage
 from dearig.window.session.layout_state import remember
 from dearig.window.session.page import Page, Pages
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["FollowPage", "TargetEditor"]
 
@@ -125,7 +125,7 @@ class FollowPage(Page):
         page.waits.connect(run.follow_button.setVisible)
         return page
 
-    def restore(self, text: str, file: TextFile) -> None:
+    def restore(self, text: str, file: EditedFile) -> None:
         """Replace the target by the unsaved one of an earlier window."""
         self.target.restore(text, file)
 
@@ -491,4 +491,4 @@ class TargetEditor(TomlEditor):
         elif self.files.confirm_discard():
             segment = {"kind": "csv", "file": path.name}
             text = tomli_w.dumps({"name": path.stem, "segment": [segment]})
-            self.restore(text, TextFile("target", text, None, path.parent))
+            self.restore(text, EditedFile("target", text, None, path.parent))

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from dearig.printable import printable
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import button, label, plain_tip
+from dearig.window.kit.widgets import ElidedLabel, button, plain_tip
 from dearig.window.session.state import Session
 
 __all__ = ["AcknowledgeBar", "Alarm", "AlarmLog", "AlarmTable"]
@@ -207,7 +207,7 @@ class AcknowledgeBar(QWidget):
         super().__init__(parent)
         self._log = alarms
         self._session = session
-        self.words = label("", "warn")
+        self.words = ElidedLabel("warn", hugging=True)
         self.button: QPushButton = button(
             "Ac&knowledge", "Acknowledge all alarms of the list, with the operator's name"
         )
@@ -228,7 +228,7 @@ class AcknowledgeBar(QWidget):
         words = f"{pending} to acknowledge" if pending else ""
         if pending and not named:
             words += ": enter your name in Operator"
-        self.words.setText(words)
+        self.words.show_text(words)
         self.words.setVisible(bool(words))
         self.button.setEnabled(pending > 0 and named)
 

@@ -101,8 +101,7 @@ class HighVoltageBar(QFrame):
         self.detail.setWordWrap(True)  # "switch the amplifier off" must not be cut
         self.detail.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self.detail.setMinimumWidth(_WORDS)
-        self.alarm = ElidedLabel()
-        set_role(self.alarm, "bad")
+        self.alarm = ElidedLabel("bad")
         self.acknowledge_button = button(
             "Acknowledge …", "Release the alarm in the name of a person who has looked at the rig"
         )

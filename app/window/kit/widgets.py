@@ -6,7 +6,7 @@ import math
 from html import escape
 
 from PySide6 import QtGui
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -38,6 +38,7 @@ __all__ = [
 ]
 
 _NAME_WIDTH = 420  # px of a list of names, at most
+_EDGES = 2  # px of a line that are not for its text: glyphs reach beyond their advance
 
 
 def label(text: str, role: str = "", tip: str = "") -> QLabel:
@@ -135,27 +136,48 @@ class Message(QLabel):
 
 
 class ElidedLabel(QLabel):
-    """One line of plain text that is cut at its end where there is no room; the tip has all."""
+    """One line of plain text that is cut at its end where there is no room; the tip has all.
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    It takes the room that is left; with ``hugging`` it asks for that of its text, and takes less
+    where there is less.
+    """
+
+    def __init__(
+        self, role: str = "", *, hugging: bool = False, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self.setTextFormat(Qt.TextFormat.PlainText)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self._hugging = hugging
+        policy = QSizePolicy.Policy.Maximum if hugging else QSizePolicy.Policy.Ignored
+        self.setSizePolicy(policy, QSizePolicy.Policy.Fixed)
         self.full_text = ""  #: text that is shown as far as there is room
+        if role:
+            self.setProperty("role", role)
 
-    def show_text(self, text: str) -> None:
-        """Show ``text``."""
-        if text != self.full_text:
+    def show_text(self, text: str, tip: str = "") -> None:
+        """Show ``text``; the tool tip has it whole, with ``tip`` below it."""
+        whole = plain_tip(f"{text}\n{tip}" if tip else text)
+        if text != self.full_text or whole != self.toolTip():
             self.full_text = text
-            self.setToolTip(plain_tip(text))
+            self.setToolTip(whole)
             self._cut()
+            self.updateGeometry()
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        hint = super().sizeHint()
+        if self._hugging:
+            hint.setWidth(self.fontMetrics().size(0, self.full_text).width() + _EDGES)
+        return hint
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        return QSize(0, super().minimumSizeHint().height())
 
     def resizeEvent(self, event: QtGui.QResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
         self._cut()
 
     def _cut(self) -> None:
-        room = max(self.width() - 2, 0)
+        room = max(self.width() - _EDGES, 0)
         self.setText(
             self.fontMetrics().elidedText(self.full_text, Qt.TextElideMode.ElideRight, room)
         )

@@ -79,6 +79,7 @@ class Library(QObject):
         self._entries: dict[str, Entry] = {}
         self._stamps: dict[str, Stamp] = {}
         self._unread: list[Path] = []  # without an entry, the next one last
+        self._in_reading = 0  # files of the job that reads them
         self._unassessed: dict[Path, None] = {}  # without errors, in their order
         self._preferred: tuple[Path, ...] = ()
         self._job: Job | None = None
@@ -104,7 +105,7 @@ class Library(QObject):
     @property
     def left(self) -> int:
         """Number of files still to be read or compared with the model."""
-        return len(self._unread) + len(self._unassessed)
+        return len(self._unread) + self._in_reading + len(self._unassessed)
 
     def submit(self, function: Callable[..., Any], *given: Any) -> Job:
         """Run ``function(*given)`` in the process, before the summaries that still wait."""
@@ -196,7 +197,10 @@ class Library(QObject):
         self._worker.clear()
         self._unread.clear()
         self._unassessed.clear()
-        self._job = None
+        self._forget_job()
+
+    def _forget_job(self) -> None:
+        self._job, self._in_reading = None, 0
 
     def _watch(self, folders: tuple[str, ...]) -> None:
         wanted = [str(self.folder), *(str(self.folder / name) for name in folders)][:_WATCHED_MAX]
@@ -271,6 +275,7 @@ class Library(QObject):
         of = self._round
         if self._unread:
             paths = [self._unread.pop() for _ in range(min(_BATCH, len(self._unread)))]
+            self._in_reading = len(paths)
             names = [path.relative_to(self.folder).as_posix() for path in paths]
             self._job = self._worker.submit(read_entries, self.folder, names)
             self._job.finished.connect(lambda entries: self._take_entries(entries, of))
@@ -296,14 +301,14 @@ class Library(QObject):
     def _again(self, paths: list[Path], of: int) -> None:
         """Go on after a job that an interrupt of another job has ended: it came too late."""
         if of == self._round:
-            self._job = None
+            self._forget_job()
             self._unread += reversed(paths)
             self._next()
 
     def _take_entries(self, entries: tuple[Entry, ...], of: int) -> None:
         if of != self._round:
             return
-        self._job = None
+        self._forget_job()
         self._fresh_entries = True
         for entry in entries:
             path = self.folder / entry.path
@@ -320,7 +325,7 @@ class Library(QObject):
     def _take_errors(self, found: Assessment, of: int, *, kept: bool) -> None:
         if of != self._round:
             return
-        self._job = None
+        self._forget_job()
         self._unassessed.pop(found.path, None)
         if found.path in self.summaries:
             if kept:

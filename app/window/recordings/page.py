@@ -34,7 +34,7 @@ from dearig.window.imports.queue import Imports
 from dearig.window.jobs.worker import Job
 from dearig.window.kit.report_table import ReportTable, two_columns
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import Message, button, label, menu_button, plain_tip
+from dearig.window.kit.widgets import ElidedLabel, Message, button, menu_button, plain_tip
 from dearig.window.recordings.conditions_table import ConditionsTable
 from dearig.window.recordings.curves_plot import CurvesPlot, rms_text
 from dearig.window.recordings.folder_model import FolderModel
@@ -178,7 +178,7 @@ class RecordingsPage(Page):
         self.model_box.activated.connect(self._model_chosen)
         compare_label = QLabel("&Compare with")
         compare_label.setBuddy(self.model_box)
-        self.count = label("", "muted")
+        self.count = ElidedLabel("muted", hugging=True)
         self.subfolders = QCheckBox("Su&bfolders")
         self.subfolders.setChecked(self._library.deep)
         self.subfolders.setToolTip("List the recordings in subfolders too")
@@ -577,7 +577,7 @@ class RecordingsPage(Page):
             if self._library.left:
                 words += f", {self._library.left} to read"
             words += ", reading curves …" * any(p not in self._read for p in self._wanted)
-        self.count.setText(words)
+        self.count.show_text(words)
 
     @Slot(int)
     def _view_changed(self, _: int) -> None:

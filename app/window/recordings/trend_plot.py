@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidg
 from dearig.analysis.summary import QUANTITIES, RecordingSummary, how_it_ended, numbers
 from dearig.report.text.numbers import significant
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import label
+from dearig.window.kit.widgets import ElidedLabel
 from dearig.window.plots.area import PlotArea
 from dearig.window.plots.plot import Plot
 from dearig.window.session.state import Session
@@ -50,7 +50,7 @@ class TrendPlot(QWidget):
             place = self.quantity.count() - 1
             self.quantity.setItemData(place, quantity.tip, Qt.ItemDataRole.ToolTipRole)
         self.quantity.setCurrentIndex(self.quantity.findData("peak_mm"))
-        self.words = label("", "muted")
+        self.words = ElidedLabel("muted")
         self.area = PlotArea(session, "Trend of the recordings")
         self.plot = self.area.add_plot(0, left="Number", bottom=_BOTTOM, group="date", dates=True)
         self.area.canvas.clicked.connect(self._clicked)
@@ -122,7 +122,7 @@ class TrendPlot(QWidget):
         words = f"{count} run{'' if count == 1 else 's'}"
         if without:
             words += f"; {without} without this number, or not read yet"
-        self.words.setText(f"{words}. Click a point to select its recording")
+        self.words.show_text(f"{words}. Click a point to select its recording")
         self.area.file_stem = f"trend of {self.quantity.currentText()}"
         self._draw()
         self.area.auto_range()
@@ -165,7 +165,7 @@ class TrendPlot(QWidget):
             summary = best[1]
             told = numbers(summary).get(self.quantity.currentData())
             shown = "" if told is None else significant(told, 4)
-            self.words.setText(f"{summary.name}: {shown}, {how_it_ended(summary)[1]}")
+            self.words.show_text(f"{summary.name}: {shown}, {how_it_ended(summary)[1]}")
             self.picked.emit(summary.path)
 
 

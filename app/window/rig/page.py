@@ -39,9 +39,10 @@ from dearig.window.kit.fields import form_fields, in_words
 from dearig.window.kit.form import Form
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
+from dearig.window.rig.live_inputs import LiveInputs
 from dearig.window.session.page import Page
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["RigPage"]
 
@@ -66,7 +67,7 @@ class RigPage(Page):
         self._typing = False  # a name or server is typed, and not taken
         self.forms: dict[str, Form] = {}  # made when their tab is first shown
         self._areas: dict[str, QScrollArea] = {}
-        self.file = TextFile("rig file", session.rig_text, session.rig_path)
+        self.file = EditedFile("rig file", session.rig_text, session.rig_path)
         self._checks = Background(self)
         self._checks.done.connect(self._checked)
         self._checks.failed.connect(lambda words: self.summary.show_text(words))
@@ -132,7 +133,14 @@ class RigPage(Page):
     def check(self) -> None:
         """Check the instruments; the output stays at 0 V."""
         address, rig_file = self.session.address, self.session.rig_file
-        self._checks.start(lambda: (rig_file, check_rig(address, rig_file)))
+        self.live.stop()  # it has the inputs
+        self.instruments.setCurrentIndex(0)
+
+        def look() -> tuple[RigFile, CheckOutcome]:
+            self.live.wait()
+            return rig_file, check_rig(address, rig_file)
+
+        self._checks.start(look)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Check a simulated rig when the page is shown; a real one waits for the button."""
@@ -169,7 +177,7 @@ class RigPage(Page):
         session = self.session
         if session.rig_text not in (self.text, self._in_force):  # another page opened another file
             self.text = self._in_force = session.rig_text
-            self.file = TextFile("rig file", self.text, session.rig_path)
+            self.file = EditedFile("rig file", self.text, session.rig_path)
             self._show_all()
 
     # the rig file
@@ -178,18 +186,19 @@ class RigPage(Page):
         """Change one key; a rig file with faults shows them, is not used, and blocks arming."""
         self._take(with_key(self.text, table, key, value), self.file)
 
-    def restore(self, text: str, file: TextFile) -> None:
+    def restore(self, text: str, file: EditedFile) -> None:
         """Replace the rig file by the unsaved one of an earlier window."""
         self._take(text, file)
         self._show_all()
 
     def close_work(self) -> None:
         """Wait for the threads."""
+        self.live.close_work()
         self._checks.close()
         self.files.close()
 
-    @Slot(str, TextFile)
-    def _opened(self, text: str, file: TextFile) -> None:
+    @Slot(str, EditedFile)
+    def _opened(self, text: str, file: EditedFile) -> None:
         self._take(text, file)
         self._show_all()
 
@@ -197,7 +206,7 @@ class RigPage(Page):
     def _saved(self) -> None:
         self._take(self.text, self.file)  # the path may be another one
 
-    def _take(self, text: str, file: TextFile) -> None:
+    def _take(self, text: str, file: EditedFile) -> None:
         try:
             faults = faults_of(text)
         except InputError as error:
@@ -387,7 +396,16 @@ class RigPage(Page):
         row.addWidget(self.check_button)
         column.addLayout(row)
         self.summary = Message()
-        column.addWidget(self.summary)
+        self.live = LiveInputs(self.session)
+        checked = QWidget()
+        results = QVBoxLayout(checked)
+        results.setContentsMargins(0, SPACE // 2, 0, 0)
+        results.addWidget(self.summary)
+        self.instruments = QTabWidget()
+        self.instruments.addTab(checked, "Check")
+        self.instruments.addTab(self.live, "Live values")
+        self.instruments.setTabToolTip(1, "Every input at rest, with its noise; nothing is output")
+        column.addWidget(self.instruments, 1)
         self.findings = QTableWidget(0, 4)
         self.findings.setHorizontalHeaderLabels(("", "Instrument", "Item", "Result"))
         self.findings.verticalHeader().hide()
@@ -402,7 +420,7 @@ class RigPage(Page):
         header.resizeSection(1, 120)  # px; the tooltip has the whole name
         header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
         self.findings.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        column.addWidget(self.findings, 1)
+        results.addWidget(self.findings, 1)
         return card(column)
 
     def _make_editor_card(self) -> QWidget:
@@ -465,5 +483,5 @@ class RigPage(Page):
     @Slot()
     def _ask_defaults(self) -> None:
         if self.files.confirm_discard():
-            self._take("", TextFile("rig file", ""))
+            self._take("", EditedFile("rig file", ""))
             self._show_all()

@@ -13,7 +13,7 @@ from dearig.window.high_voltage.bar import label_stop, stop_button
 from dearig.window.high_voltage.state import HighVoltage, HighVoltageBadge
 from dearig.window.high_voltage.status import HighVoltageStatus
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import ElidedLabel, Message, Readout, card, label, set_role
+from dearig.window.kit.widgets import ElidedLabel, Message, Readout, card, label
 from dearig.window.run.live import RunSnapshot
 from dearig.window.session.state import Session
 
@@ -110,7 +110,7 @@ class RunControls(QWidget):
         self.time_left = label("", "title")
         self.time_left.setWordWrap(True)
         self.of_sample = label("", "muted", "Time of the sample that the readouts show")
-        self.segment = label("", "muted", "Segment that is playing")
+        self.segment = ElidedLabel("muted")
         self.progress = QProgressBar()
         self.progress.setRange(0, 1000)
         self.progress.setTextVisible(False)
@@ -126,8 +126,7 @@ class RunControls(QWidget):
             step.setMinimumHeight(40)
             steps.addWidget(step)
         column.addLayout(steps)
-        self.rig = ElidedLabel()  # that is in force
-        set_role(self.rig, "muted")
+        self.rig = ElidedLabel("muted")  # that is in force
         column.addWidget(self.rig)
         column.addWidget(self.stop_button)
         # below STOP: texts of any length must not move it
@@ -178,8 +177,8 @@ class RunControls(QWidget):
         self._numbers_of = self._status.run_number
         for readout in self.numbers.values():
             readout.show_number(math.nan, 0)
-        for text in (self.time_left, self.segment):
-            text.setText("")
+        self.time_left.setText("")
+        self.segment.show_text("")
         self.progress.setValue(0)
 
     def show_numbers(self, now: RunSnapshot) -> None:
@@ -202,12 +201,12 @@ class RunControls(QWidget):
         if not self._status.live:
             state = self._status.state
             self.time_left.setText(_ENDING.get(state, state.value.capitalize()))
-            self.segment.setText("")
+            self.segment.show_text("")
             return
         left = max(0.0, (now.total - now.samples) / now.rate)
         self.time_left.setText(f"{left:.1f} s left")
         self.progress.setValue(round(1000 * now.samples / max(now.total, 1)))
-        self.segment.setText(f"playing: {segment}" if segment else "")
+        self.segment.show_text(f"playing: {segment}" if segment else "")
 
     def show_room(self, newest: tuple[float, RoomReading] | None, seconds: float) -> None:
         """Show the newest reading of the room at ``seconds`` of the run, with its age."""
@@ -234,7 +233,7 @@ class RunControls(QWidget):
         for place in (0, 1):
             self._model_groups[place].setVisible(place < len(overlays))
             if place < len(overlays):
-                self._model_titles[place].setText(f"Error of {overlays[place].name}")
+                self._model_titles[place].show_text(f"Error of {overlays[place].name}")
 
     def _readouts(self) -> QVBoxLayout:
         column = QVBoxLayout()
@@ -272,7 +271,7 @@ class RunControls(QWidget):
             group = QVBoxLayout()
             group.setContentsMargins(0, 4, 0, 0)
             group.setSpacing(0)
-            title = label("", "heading")
+            title = ElidedLabel("heading")
             group.addWidget(title)
             for name, words, unit, tip in (
                 ("rms", "RMS, whole run", "µm", "RMS of measured minus model since the start"),

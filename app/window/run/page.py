@@ -281,7 +281,7 @@ class RunPage(Page):
         self.controls.time_left.setText(end.headline)
         if end.result is not None:
             self.controls.progress.setValue(1000)
-        self.controls.segment.setText("")
+        self.controls.segment.show_text("")
         role = "good" if end.result is not None else "bad"
         named = end.path is None or str(end.path) in end.sentence
         where = "" if named else f" · recorded in {end.path}"

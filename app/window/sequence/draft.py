@@ -12,7 +12,7 @@ from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.toml_edit import SegmentTexts, split_segments, written_anew
 from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["Draft", "relative_csv"]
 
@@ -25,7 +25,7 @@ class _State:
 
     data: dict[str, Any]
     text: SegmentTexts | str
-    file: TextFile
+    file: EditedFile
 
     @property
     def toml(self) -> str:
@@ -40,8 +40,8 @@ class Draft:
     file that was open before, too.
     """
 
-    def __init__(self, toml: str, file: TextFile | None = None) -> None:
-        self._states = [_state(toml, file or TextFile("sequence", toml))]
+    def __init__(self, toml: str, file: EditedFile | None = None) -> None:
+        self._states = [_state(toml, file or EditedFile("sequence", toml))]
         self._at = 0
         self._last: tuple[object, ...] = ()
 
@@ -62,7 +62,7 @@ class Draft:
         return self._states[self._at].toml
 
     @property
-    def file(self) -> TextFile:
+    def file(self) -> EditedFile:
         """File of the sequence."""
         return self._states[self._at].file
 
@@ -86,12 +86,12 @@ class Draft:
         self._at = min(self._at + 1, len(self._states) - 1)
         self._last = ()
 
-    def replace(self, toml: str, file: TextFile | None = None) -> None:
+    def replace(self, toml: str, file: EditedFile | None = None) -> None:
         """Replace the whole sequence by that of another file, None of no file.
 
         Raises ``InputError`` if ``toml`` is not TOML.
         """
-        self._push(_state(toml, file or TextFile("sequence", toml)))
+        self._push(_state(toml, file or EditedFile("sequence", toml)))
 
     def set_head(self, key: str, value: Any) -> None:
         """Set ``name``, ``lead_in_s`` or ``tail_s``; None leaves the key out."""
@@ -177,7 +177,7 @@ def _with(table: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
     return {**table, key: value}
 
 
-def _state(toml: str, file: TextFile) -> _State:
+def _state(toml: str, file: EditedFile) -> _State:
     return _State(_tables(toml), split_segments(toml) or toml, file)
 
 

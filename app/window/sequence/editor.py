@@ -39,7 +39,7 @@ from dearig.window.kit.form import Form
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, label, menu_button, plain_tip, set_wrong
 from dearig.window.sequence.draft import Draft
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["SequenceEditor"]
 
@@ -62,7 +62,7 @@ class SequenceEditor(QWidget):
     file_wanted = Signal()
 
     def __init__(
-        self, toml: str, file: TextFile | None = None, parent: QWidget | None = None
+        self, toml: str, file: EditedFile | None = None, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
         self.draft = Draft(toml, file)
@@ -91,7 +91,7 @@ class SequenceEditor(QWidget):
 
     # changes
 
-    def replace(self, toml: str, file: TextFile) -> None:
+    def replace(self, toml: str, file: EditedFile) -> None:
         """Replace the draft by that of another file. Raises ``InputError`` if it is not TOML."""
         self.draft.replace(toml, file)
         self.fill(0)

@@ -21,7 +21,7 @@ from dearig.window.sequence.preview_panel import PreviewPanel
 from dearig.window.session.layout_state import remember
 from dearig.window.session.page import Page
 from dearig.window.session.state import Preview, Session
-from dearig.window.session.text_file import Saved, TextFile
+from dearig.window.session.text_file import EditedFile, Saved
 
 __all__ = ["SequencePage"]
 
@@ -42,7 +42,7 @@ class SequencePage(Page):
         toml, folder = session.sequence_toml, session.sequence_folder
         # what an earlier session had without a file is in no file yet
         kept = session.sequence_path is None and toml not in PRESETS.values()
-        file = TextFile("sequence", "" if kept else toml, session.sequence_path, folder)
+        file = EditedFile("sequence", "" if kept else toml, session.sequence_path, folder)
         self.editor = SequenceEditor(toml, file)
         self.preview = PreviewPanel(session)
         self._sent = session.sequence_toml  # the text that this page gave to the session last
@@ -92,10 +92,10 @@ class SequencePage(Page):
         """
         folder = Path() if path is None else path.parent
         return self.files.confirm_discard() and self._take(
-            toml, TextFile("sequence", toml, path, folder)
+            toml, EditedFile("sequence", toml, path, folder)
         )
 
-    def restore(self, toml: str, file: TextFile) -> None:
+    def restore(self, toml: str, file: EditedFile) -> None:
         """Replace the sequence by the unsaved one of an earlier window."""
         self._take(toml, file)
 
@@ -118,8 +118,8 @@ class SequencePage(Page):
         """Wait for the thread."""
         self.files.close()
 
-    @Slot(str, TextFile)
-    def _opened(self, toml: str, file: TextFile) -> None:
+    @Slot(str, EditedFile)
+    def _opened(self, toml: str, file: EditedFile) -> None:
         if self._take(toml, file) and file.path is not None:
             self.session.add_recent(file.path)
 
@@ -130,7 +130,7 @@ class SequencePage(Page):
         self._edited()  # the path may be another one
         self.session.add_recent(done.path)
 
-    def _take(self, toml: str, file: TextFile) -> bool:
+    def _take(self, toml: str, file: EditedFile) -> bool:
         """Replace the sequence; return False, with a message, where ``toml`` is none."""
         try:
             self.editor.replace(toml, file)
@@ -170,7 +170,7 @@ class SequencePage(Page):
         session = self.session
         if session.sequence_toml != self._sent:  # it came from another page
             toml, folder = session.sequence_toml, session.sequence_folder
-            self._take(toml, TextFile("sequence", toml, session.sequence_path, folder))
+            self._take(toml, EditedFile("sequence", toml, session.sequence_path, folder))
         self.preview.show_planning()
 
     # display

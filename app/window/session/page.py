@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal, Slot
 from PySide6.QtWidgets import QWidget
 
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["Page", "Pages"]
 
@@ -48,7 +48,7 @@ class Page(QWidget):
     def close_work(self) -> None:
         """End the page's threads and processes, and wait for them."""
 
-    def restore(self, text: str, file: TextFile) -> None:
+    def restore(self, text: str, file: EditedFile) -> None:
         """Replace the text that the page ``edits`` by the unsaved one of an earlier window."""
         raise NotImplementedError(f"the page {self.title} edits no {file.what}")
 

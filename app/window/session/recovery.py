@@ -21,7 +21,7 @@ from PySide6.QtCore import QLockFile, QObject, QSettings, QStandardPaths, QTimer
 from dearig.errors import InputError
 from dearig.input_file import read_input
 from dearig.recording.files import write_whole
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 __all__ = ["FORMAT", "Recovery", "UnsavedText", "lock_of", "unsaved_folder"]
 
@@ -48,10 +48,10 @@ class UnsavedText:
     changes: str
     at: float
 
-    def file(self, what: str) -> TextFile:
+    def file(self, what: str) -> EditedFile:
         """Return the file that the text came from."""
         path = Path(self.path) if self.path else None
-        return TextFile(what, self.saved, path, Path(self.folder))
+        return EditedFile(what, self.saved, path, Path(self.folder))
 
 
 class Recovery(QObject):
@@ -67,7 +67,7 @@ class Recovery(QObject):
         self._folder = unsaved_folder(settings)
         self._path = self._folder / f"{os.getpid()}-{secrets.token_hex(4)}.json"
         self._lock: QLockFile | None = None
-        self._texts: dict[str, tuple[TextFile, str]] = {}
+        self._texts: dict[str, tuple[EditedFile, str]] = {}
         self._timer = QTimer(self, singleShot=True, interval=_WAIT)
         self._timer.timeout.connect(self.write)
 
@@ -76,7 +76,7 @@ class Recovery(QObject):
         """What would be lost now, each text with what is changed in it."""
         return [file.changes(text) for file, text in self._texts.values()]
 
-    def note(self, file: TextFile, text: str) -> None:
+    def note(self, file: EditedFile, text: str) -> None:
         """Note the present ``text`` of ``file``: it is kept while it has unsaved changes."""
         was = file.what in self._texts
         if file.is_unsaved(text):
@@ -128,7 +128,7 @@ class Recovery(QObject):
                     lock.unlock()
 
 
-def _unsaved(file: TextFile, text: str) -> UnsavedText:
+def _unsaved(file: EditedFile, text: str) -> UnsavedText:
     path = "" if file.path is None else str(file.path.absolute())
     folder = str(file.folder.absolute())
     return UnsavedText(text, file.saved, path, folder, file.changes(text), time.time())

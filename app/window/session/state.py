@@ -96,10 +96,11 @@ class Session(QObject):
     recent_changed = Signal()
     recorded = Signal(Path)
     running_changed = Signal(bool)
+    armed_changed = Signal(bool)
     study_finished = Signal(object)  #: a ``Study`` has just been saved in the folder
     hold_changed = Signal()  #: another feedback belongs to the sequence
     blocks_changed = Signal()
-    output_read = Signal(object)  #: state of the output that a check of the rig has read
+    output_read = Signal(object)  #: state of the output, read at rest
     message = Signal(str)  #: text for the status bar
 
     def __init__(
@@ -263,7 +264,9 @@ class Session(QObject):
 
     def set_armed(self, armed: bool) -> None:
         """Say that the rig was armed or disarmed."""
-        self.armed = armed
+        if armed != self.armed:
+            self.armed = armed
+            self.armed_changed.emit(armed)
 
     @property
     def busy(self) -> bool:

@@ -13,13 +13,13 @@ from dearig.recording.files import write_whole
 from dearig.window.kit.fields import in_words
 from dearig.window.kit.widgets import plain_tip
 
-__all__ = ["OverwriteQuestion", "Saved", "TextFile"]
+__all__ = ["EditedFile", "OverwriteQuestion", "Saved"]
 
 _PARTS_MAX = 4  # changed parts that a question names
 
 
 @dataclass(eq=False)
-class TextFile:
+class EditedFile:
     """File of an edited text: its ``path``, None without one, and the text that is ``saved`` there.
 
     ``saved`` of a text without a file is where the editing began: a preset, a proposal.
@@ -84,7 +84,7 @@ class TextFile:
 class Saved:
     """A text that was written to its file."""
 
-    file: TextFile
+    file: EditedFile
     path: Path
     text: str
 

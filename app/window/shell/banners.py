@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt, Slot
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import ElidedLabel, button, label, set_role
+from dearig.window.kit.widgets import ElidedLabel, button, label
 from dearig.window.session.state import ArmingBlock
 
 __all__ = ["Banners"]
@@ -29,8 +29,7 @@ class Banners(QWidget):
         self._show_page = show_page
         self._texts: dict[str, tuple[str, str]] = {}
         self._blocks: dict[str, tuple[str, str]] = {}
-        self.words = ElidedLabel()
-        set_role(self.words, "warn")
+        self.words = ElidedLabel("warn")
         self.page_button = self._button("")
         self.page_button.clicked.connect(self._go_to_first)
         self.all_button = self._button("All …")

@@ -13,7 +13,7 @@ from dearig.acquisition.warm_up import compile_kernels, has_cache, is_warm, kern
 from dearig.window.jobs.background import Background
 from dearig.window.jobs.worker import Job, Worker
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import label
+from dearig.window.kit.widgets import ElidedLabel
 
 __all__ = ["Compilation", "CompilationBar"]
 
@@ -116,7 +116,7 @@ class CompilationBar(QFrame):
     def __init__(self, compilation: Compilation, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._compilation = compilation
-        self.words = label("")
+        self.words = ElidedLabel(hugging=True)
         self.bar = QProgressBar()
         self.bar.setRange(0, 0)  # it moves without an end
         self.bar.setTextVisible(False)
@@ -137,7 +137,7 @@ class CompilationBar(QFrame):
         running = self._compilation.running
         self.setVisible(running)
         if running:
-            self.words.setText(
+            self.words.show_text(
                 f"Compiling the model once, about a minute: {self._compilation.seconds:.0f} s, "
                 f"{self._compilation.kernels} functions; the plan follows"
             )

@@ -42,7 +42,7 @@ from dearig.window.documents.questions import may_close, offer_unsaved
 from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.stop_keys import StopKeys
 from dearig.window.kit.theme import DARK, LIGHT, SPACE, apply, system_theme
-from dearig.window.kit.widgets import label, plain_tip
+from dearig.window.kit.widgets import ElidedLabel
 from dearig.window.recordings.library import shared_library
 from dearig.window.recordings.page import RecordingsPage
 from dearig.window.run.page import RunPage
@@ -53,7 +53,7 @@ from dearig.window.session.layout_state import GROUP
 from dearig.window.session.page import Page
 from dearig.window.session.settings import kept_bytes, kept_number, kept_text
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 from dearig.window.shell.banners import Banners
 from dearig.window.shell.compilation import Compilation, CompilationBar
 from dearig.window.shell.error_panel import ErrorPanel
@@ -221,7 +221,7 @@ class MainWindow(QMainWindow):
         """Offer the unsaved texts of a window that ended without a question."""
         kinds = {kind.edits: kind for kind in PAGES if kind.edits}
 
-        def restore(text: str, file: TextFile) -> None:
+        def restore(text: str, file: EditedFile) -> None:
             self.page(kinds[file.what]).restore(text, file)
 
         offer_unsaved(self, self.session, dict.fromkeys(kinds, restore))
@@ -295,10 +295,10 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(middle)
         bar = self.statusBar()
         bar.setSizeGripEnabled(False)
-        self.status = label("")
+        self.status = ElidedLabel()
         bar.addWidget(self.status, 1)
         bar.addPermanentWidget(CompilationBar(self.compilation))
-        self.rig_and_folder = label("", "muted")
+        self.rig_and_folder = ElidedLabel("muted", hugging=True)
         bar.addPermanentWidget(self.rig_and_folder)
 
     def _menu_button(self) -> QToolButton:
@@ -340,7 +340,7 @@ class MainWindow(QMainWindow):
         self._unsaved_changed()
         session.rig_changed.connect(self._rig_or_folder_changed)
         session.folder_changed.connect(self._rig_or_folder_changed)
-        session.message.connect(self.status.setText)
+        session.message.connect(self.status.show_text)
         self.compilation.running_changed.connect(self.planner.hold)
         self.compilation.failed.connect(lambda words: run.alarms.add("warning", words))
         self.planner.progressed.connect(self.sequence_page.preview.show_progress)
@@ -366,10 +366,10 @@ class MainWindow(QMainWindow):
     def _rig_or_folder_changed(self) -> None:
         folder = self.session.folder
         session = self.session
-        self.rig_and_folder.setText(
-            f"rig {session.address}, {session.rig_name}   ·   {folder.name or folder}  "
+        self.rig_and_folder.show_text(
+            f"rig {session.address}, {session.rig_name}   ·   {folder.name or folder}  ",
+            f"Folder of the recordings: {folder}",
         )
-        self.rig_and_folder.setToolTip(plain_tip(f"Folder of the recordings: {folder}"))
 
     @Slot(int)
     def _page_changed(self, row: int) -> None:

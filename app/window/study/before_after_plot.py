@@ -9,7 +9,7 @@ from dearig.analysis.outcomes import Comparison
 from dearig.report.text.numbers import significant
 from dearig.units import SHOWN
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import label, name_list
+from dearig.window.kit.widgets import ElidedLabel, name_list
 from dearig.window.plots.area import PlotArea
 from dearig.window.plots.plot import LegendEntry
 from dearig.window.session.state import Session
@@ -32,7 +32,7 @@ class BeforeAfterPlot(QWidget):
         )
         of = QLabel("Recor&ding")
         of.setBuddy(self.record)
-        self.error_summary = label("", "muted")
+        self.error_summary = ElidedLabel("muted")
         top = QHBoxLayout()
         top.addWidget(of)
         top.addWidget(self.record)
@@ -69,7 +69,7 @@ class BeforeAfterPlot(QWidget):
             plot.clear_all()
         index = self.record.currentIndex()
         if not 0 <= index < len(self._pairs):
-            self.error_summary.setText("")
+            self.error_summary.show_text("")
             return
         before, after = self._pairs[index]
         shown = SHOWN[before.kind]
@@ -102,6 +102,6 @@ class BeforeAfterPlot(QWidget):
         if before.noise:
             level = before.noise * shown.error_factor
             said.append(f"noise {significant(level)} {shown.error_unit}")
-        self.error_summary.setText("   ".join(said))
+        self.error_summary.show_text("   ".join(said))
         self.area.file_stem = f"{before.name} residuals"
         self.area.auto_range()

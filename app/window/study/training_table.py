@@ -20,7 +20,7 @@ from dearig.analysis.summary import RecordingSummary
 from dearig.recording.content.timestamps import local_time
 from dearig.recording.reading.early_end import early_end
 from dearig.report.text.numbers import seconds
-from dearig.window.kit.widgets import button, label, plain_tip
+from dearig.window.kit.widgets import ElidedLabel, button, plain_tip
 from dearig.window.recordings.library import Library
 
 __all__ = ["TrainingPanel", "TrainingTable"]
@@ -51,7 +51,7 @@ class TrainingPanel(QWidget):
         self.search.setAccessibleName("Search the recordings")
         self.search.textChanged.connect(table.search)
         self.search.textChanged.connect(self._refresh)
-        self.count = label("", "muted")
+        self.count = ElidedLabel("muted", hugging=True)
         top = QHBoxLayout()
         top.addWidget(self.search, 1)
         top.addWidget(self.count)
@@ -81,7 +81,7 @@ class TrainingPanel(QWidget):
     def _refresh(self) -> None:
         table = self._table
         shown, count, chosen = table.shown, table.rowCount(), len(table.chosen)
-        self.count.setText(f"{shown} of {count}" if shown < count else f"{count}")
+        self.count.show_text(f"{shown} of {count}" if shown < count else f"{count}")
         for made in (self.train_button, self.validate_button, self.neither_button):
             made.setEnabled(chosen > 0)
 

@@ -14,7 +14,7 @@ from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.hardware import OUTPUTS
 from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.triggers import Reference, SampleTicks
-from dearig.sim_backend.daqmx.card.work import Input, Samples
+from dearig.sim_backend.daqmx.card.work import CardSamples, Input
 from dearig.sim_backend.daqmx.running.reading import Reader, Reading
 from dearig.sim_backend.faults import FaultKind
 
@@ -31,7 +31,7 @@ class AnalogInputWork(Input):
     def __init__(self, task: Task, parts: AnalogParts) -> None:
         super().__init__(task)
         self._parts = parts
-        self._samples = Samples(0, 0, np.int16)
+        self._samples = CardSamples(0, 0, np.int16)
 
     def resources(self) -> list[str]:
         return ["analog input"]
@@ -47,7 +47,7 @@ class AnalogInputWork(Input):
             return
         task.delivered, task.run = 0, None
         task.run_number = run.begin()
-        self._samples = Samples(len(task.inputs), min(self.room(), _KEPT) + _AT_ONCE, np.int16)
+        self._samples = CardSamples(len(task.inputs), min(self.room(), _KEPT) + _AT_ONCE, np.int16)
         task.ticks = self._special_ticks(now)
         if task.ticks is None:
             task.ticks = self._usual_ticks(now)
@@ -94,7 +94,7 @@ class AnalogInputWork(Input):
 
     def end(self, now: float) -> None:  # noqa: ARG002
         self.task.ticks, self.task.run = None, None
-        self._samples = Samples(0, 0, np.int16)
+        self._samples = CardSamples(0, 0, np.int16)
 
     # with time
 

@@ -12,7 +12,7 @@ from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.numbers import CURRENT_WRITE, WRITE_OFFSET, WRITE_RELATIVE_TO
 from dearig.sim_backend.daqmx.card.output import Generation
 from dearig.sim_backend.daqmx.card.tasks import Kind, Task
-from dearig.sim_backend.daqmx.card.work import Work
+from dearig.sim_backend.daqmx.card.work import CardWork
 from dearig.sim_backend.daqmx.running.output_buffer import OutputBuffer, may_generate
 from dearig.sim_backend.daqmx.running.states import TaskStates
 
@@ -21,7 +21,7 @@ __all__ = ["AnalogOutputWork", "AnalogOutputs"]
 _INPUTS_START = "ai/starttrigger"
 
 
-class AnalogOutputWork(Work):
+class AnalogOutputWork(CardWork):
     """Generation of an analog output ``task``; without a clock its values are set by writes."""
 
     def __init__(self, task: Task, parts: AnalogParts) -> None:

@@ -20,7 +20,7 @@ from dearig.sim_backend.daqmx.card.errors import Code
 from dearig.sim_backend.daqmx.card.numbers import CURRENT_READ, NO_TRIGGER, RISING
 from dearig.sim_backend.daqmx.card.output import Generation, Waveform
 from dearig.sim_backend.daqmx.card.triggers import Reference
-from dearig.sim_backend.daqmx.card.work import Work
+from dearig.sim_backend.daqmx.card.work import CardWork
 
 __all__ = ["Kind", "Listener", "SampleClock", "State", "Task", "Watchdog"]
 
@@ -107,7 +107,7 @@ class Task:
     outputs: list[AnalogOutput] = field(default_factory=list)
     lines: list[Lines] = field(default_factory=list)
     counters: list[CounterChannel | PulseChannel] = field(default_factory=list)
-    work: Work | None = None  # what it does while it runs; None without channels
+    work: CardWork | None = None  # what it does while it runs; None without channels
     watchdog: Watchdog | None = None
     timing: SampleClock = field(default_factory=lambda: SampleClock(1000.0, "", False, 1000))
     clocked: bool = False  # False: samples on demand

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from dearig.drivers.channels import COUNT_MAX
 from dearig.drivers.settings import RigSettings
-from dearig.sim_backend.card import Card
+from dearig.sim_backend.card import Converters
 from dearig.sim_backend.daqmx.card.channels import AnalogInput
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.plant import Plant
@@ -54,7 +54,7 @@ class Wiring:
         self._plant = plant
         self._streams = Streams(noise_seed)
         self._faults = faults
-        self._output = Card(settings, self._streams).channels[0].scaling
+        self._output = Converters(settings, self._streams).channels[0].scaling
         self._sine = sine
         self._names = {t: n for n, t in settings.terminals().items() if n != "voltage_command"}
         if sine:
@@ -104,7 +104,7 @@ class Wiring:
             # the conversion time of an input that the task does not read is arbitrary
             tuple(at.get(wired[n], skews[0]) for n in self._settings.channel_names[1:]),
         )
-        card = Card(settings, self._streams)
+        card = Converters(settings, self._streams)
         path = SignalPath(settings, card, self._streams, number, rate, self._faults)
         return path, path.start(self._plant)
 
@@ -210,8 +210,8 @@ class Wiring:
             return 0.0
         return (thermometer.room_celsius - thermometer.celsius_at_0_V) / thermometer.celsius_per_V
 
-    def _card(self, inputs: Sequence[AnalogInput]) -> Card:
-        return Card(self._as_converted(inputs, ()), self._streams)
+    def _card(self, inputs: Sequence[AnalogInput]) -> Converters:
+        return Converters(self._as_converted(inputs, ()), self._streams)
 
     def _as_converted(
         self, inputs: Sequence[AnalogInput], conversions: tuple[float, ...]

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from dearig.sim_backend.daqmx.card.acquisition import Ticks
     from dearig.sim_backend.daqmx.card.tasks import Task
 
-__all__ = ["Input", "SampledInput", "Samples", "Work"]
+__all__ = ["CardSamples", "CardWork", "Input", "SampledInput"]
 
 
-class Work(ABC):
+class CardWork(ABC):
     """Work of ``task``; every time is in s on the card's clock."""
 
     ticks: Ticks | None = None  # times of the samples of an input
@@ -54,7 +54,7 @@ class Work(ABC):
         """Return when there are ``samples`` (None: without end), or None where it is unknown."""
 
 
-class Input(Work):
+class Input(CardWork):
     """Work of a task that is read; its samples are numbered from 0 at the start."""
 
     @abstractmethod
@@ -85,7 +85,7 @@ class Input(Work):
         """Return when there will be one, or None where it is unknown."""
 
 
-class Samples:
+class CardSamples:
     """The newest samples (rows, n) of a task: the last ``room``, and those of the same block."""
 
     def __init__(self, rows: int, room: int, kind: type) -> None:
@@ -120,7 +120,7 @@ class Samples:
 class SampledInput(Input):
     """Input whose samples are taken as time passes, because a signal's past is not kept."""
 
-    samples: Samples | None = None
+    samples: CardSamples | None = None
 
     def watch(self, now: float) -> None:
         if self.samples is None or self.task.failed is not None:

@@ -13,7 +13,7 @@ from dearig.sim_backend.daqmx.card.signals import Signal
 from dearig.sim_backend.daqmx.card.tasks import Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.triggers import AwaitedEdge, Edge, Pause, SampleTicks
-from dearig.sim_backend.daqmx.card.work import SampledInput, Samples
+from dearig.sim_backend.daqmx.card.work import CardSamples, SampledInput
 from dearig.sim_backend.daqmx.digital.counting import Counting
 from dearig.sim_backend.daqmx.digital.intervals import Intervals
 from dearig.sim_backend.daqmx.digital.measures import (
@@ -87,7 +87,7 @@ class CounterInput(SampledInput):
         clock = self.task.clock
         if clock is not None:
             rows = 2 if self.channel.measure in PULSES else 1
-            self.samples = Samples(rows, self._buffer_size(self.task), np.float64)
+            self.samples = CardSamples(rows, self._buffer_size(self.task), np.float64)
             if not clock.implicit:
                 self.ticks = self._timing(self.task, now)
         if edge is None:

@@ -11,7 +11,7 @@ from dearig.sim_backend.daqmx.card.output import Generation
 from dearig.sim_backend.daqmx.card.tasks import Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.triggers import AwaitedEdge, Edge, SampleTicks
-from dearig.sim_backend.daqmx.card.work import SampledInput, Samples, Work
+from dearig.sim_backend.daqmx.card.work import CardSamples, CardWork, SampledInput
 from dearig.sim_backend.daqmx.running.output_buffer import may_generate
 
 __all__ = ["DigitalInput", "DigitalOutput"]
@@ -46,7 +46,7 @@ class DigitalInput(SampledInput):
         if self.task.clock is not None:
             self.ticks = self._timing(self.task, now)
             room = self._buffer_size(self.task)
-            self.samples = Samples(len(self.task.line_names), room, np.uint8)
+            self.samples = CardSamples(len(self.task.line_names), room, np.uint8)
 
     def _new(self, now: float) -> int:
         return 0 if self.ticks is None else self.ticks.passed(now)
@@ -78,7 +78,7 @@ class DigitalInput(SampledInput):
         return True if self.task.clock is None else super().done(now)
 
 
-class DigitalOutput(Work):
+class DigitalOutput(CardWork):
     """Lines of ``task`` on a sample clock. ``set_line(line, level, time)`` tells the wire.
 
     The lines go through the written samples as the outputs do, with their buffer and

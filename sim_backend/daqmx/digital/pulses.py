@@ -14,7 +14,7 @@ from dearig.sim_backend.daqmx.card.numbers import TIMEBASE
 from dearig.sim_backend.daqmx.card.signals import SAME_S, Series, Signal
 from dearig.sim_backend.daqmx.card.tasks import Task
 from dearig.sim_backend.daqmx.card.triggers import AwaitedEdge, Edge
-from dearig.sim_backend.daqmx.card.work import Work
+from dearig.sim_backend.daqmx.card.work import CardWork
 
 __all__ = ["Burst", "CounterOutput", "PulseSignal"]
 
@@ -112,7 +112,7 @@ class PulseSignal(Signal):
         self.bursts = [b for b in self.bursts if b.ended >= time]
 
 
-class CounterOutput(Work):
+class CounterOutput(CardWork):
     """Pulses of the channels of ``task``.
 
     ``signals`` are the counters' outputs. ``trigger(task)`` is the edge that starts them, or None;

@@ -9,7 +9,7 @@ from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.numbers import HIGH, LOW, NO_CHANGE, TRISTATE
 from dearig.sim_backend.daqmx.card.state import CardState
 from dearig.sim_backend.daqmx.card.tasks import Kind, Task, Watchdog
-from dearig.sim_backend.daqmx.card.work import Work
+from dearig.sim_backend.daqmx.card.work import CardWork
 from dearig.sim_backend.daqmx.digital.line_levels import LineLevels
 
 __all__ = ["Watchdogs"]
@@ -18,7 +18,7 @@ __all__ = ["Watchdogs"]
 _LONGEST = (2**32 - 1) * 8e-9
 
 
-class _WatchdogWork(Work):
+class _WatchdogWork(CardWork):
     """Timer of the ``watchdog`` of ``task``."""
 
     def __init__(self, task: Task, watchdog: Watchdog) -> None:

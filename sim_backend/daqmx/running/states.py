@@ -9,7 +9,7 @@ from dearig.sim_backend.daqmx.card.checks import not_running, raise_failure
 from dearig.sim_backend.daqmx.card.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.card.state import CardState
 from dearig.sim_backend.daqmx.card.tasks import State, Task
-from dearig.sim_backend.daqmx.card.work import Work
+from dearig.sim_backend.daqmx.card.work import CardWork
 from dearig.sim_backend.daqmx.setup.routes import Routes
 from dearig.sim_backend.daqmx.setup.timing import Timing
 
@@ -147,7 +147,7 @@ class TaskStates:
 
     # parts of changes of state, at the time ``now`` in s
 
-    def verify(self, task: Task) -> Work:
+    def verify(self, task: Task) -> CardWork:
         """Refuse ``task`` where its settings do not agree; returns what it does."""
         if task.work is None:
             raise DaqmxError(Code.NOT_WITHOUT_CHANNELS, f"Task Name: {task.name}")

@@ -23,7 +23,7 @@ from dearig.sim_backend.daqmx.card.sensors import Sensor
 from dearig.sim_backend.daqmx.card.state import CardState
 from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.wiring import OUTPUT_MONITOR, Wiring
-from dearig.sim_backend.daqmx.card.work import Work
+from dearig.sim_backend.daqmx.card.work import CardWork
 from dearig.sim_backend.daqmx.setup.custom_scales import CustomScales
 
 __all__ = ["AnalogChannels"]
@@ -37,7 +37,7 @@ class AnalogChannels:
         state: CardState,
         scales: CustomScales,
         wiring: Wiring,
-        work: Callable[[Task, Kind], Work],
+        work: Callable[[Task, Kind], CardWork],
     ) -> None:
         self._state = state
         self._scales = scales

@@ -11,7 +11,7 @@ import pytest
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.slow_noise import Drift, DriftSpace, WhitenedProblem, drift_modes
 from dearig.model.simulation.actuator import Actuator
 from tests.tools.engine import PLAIN, record_of, typical
@@ -24,7 +24,7 @@ def fit(model: Actuator, cost: float, seed: int = 0, drift: float = 0.0, lead_in
     """A fit of ``model`` that leaves white noise of this mean square."""
     record = replace(record_of(PLAIN), lead_in=lead_in)
     noise = Drift(DriftSpace([drift_modes(record, 4)]), drift) if drift else None
-    problem = WhitenedProblem([record], Layout(model), noise, workers=1)
+    problem = WhitenedProblem([record], FitLayout(model), noise, workers=1)
     r = np.random.default_rng(seed).standard_normal(problem.samples)
     r *= math.sqrt(cost / float(np.mean(r**2)))
     x = problem.layout.coordinates(problem.layout.initial())

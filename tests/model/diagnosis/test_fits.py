@@ -9,14 +9,14 @@ import pytest
 
 from dearig.model.diagnosis.fits import Fit
 from dearig.model.film.material import Network
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.slow_noise import WhitenedProblem
 from tests.tools.engine import PLAIN, record_of
 
 
 def test_sorted_branches_are_the_same_fit_with_its_held_numbers() -> None:
     network = Network.gent((8e4, 2e4, 4e4), (1e4, 50.0, 60.0), (3.0, 0.3))
-    layout = Layout(replace(PLAIN, network=network))
+    layout = FitLayout(replace(PLAIN, network=network))
     problem = WhitenedProblem([record_of(PLAIN)], layout, workers=1)
     x = layout.coordinates(layout.initial())
     held = np.array([name == "J_1" for name in layout.names])

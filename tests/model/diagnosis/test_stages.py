@@ -9,7 +9,7 @@ import pytest
 
 from dearig.model.diagnosis.fits import Fit
 from dearig.model.diagnosis.stages import with_drift
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.slow_noise import Drift, DriftSpace, WhitenedProblem, drift_basis
 from dearig.model.simulation.actuator import Actuator
 from tests.tools.engine import NOISE, PLAIN, record_of
@@ -20,7 +20,7 @@ def test_a_records_model_contains_its_most_probable_drift() -> None:
     time = record.time / record.time[-1]
     moved = 2e-5 * (np.cos(3.0 * time) - 1.0 + 0.5 * np.sin(6.0 * time) - 3.0 * time)
     record = replace(record, displacement=record.displacement + moved)
-    layout = Layout(PLAIN)
+    layout = FitLayout(PLAIN)
     drift = Drift(DriftSpace([drift_basis(record, 24)]), 3e3)
     problem = WhitenedProblem([record], layout, drift, workers=1)
     x = layout.coordinates(layout.initial())

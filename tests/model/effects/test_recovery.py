@@ -13,7 +13,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.film.material import Branch, Network
 from dearig.model.fitting.intervals import correlation_time, covariance
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
 from dearig.model.simulation.actuator import Drive
@@ -155,7 +155,7 @@ def refitted(truth, start):
     """
     closely = any(name in CLOSELY for name, _ in truth.effects)
     fidelity = kernel.CAREFUL if closely else kernel.QUICK
-    problem = Problem(records(truth), Layout(start), workers=1, fidelity=fidelity)
+    problem = Problem(records(truth), FitLayout(start), workers=1, fidelity=fidelity)
     layout = problem.layout
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True
@@ -173,7 +173,7 @@ def refitted(truth, start):
     inflation = max(1.0, fit.cost) * max(1.0, correlation_time(fit.residuals))
     sigma = np.zeros(layout.size)
     sigma[~held] = np.sqrt(np.diag(covariance(jac.T @ jac, inflation)))
-    clean, _ = problem.predict(Layout(truth).initial())
+    clean, _ = problem.predict(FitLayout(truth).initial())
     misfit = (problem.residuals(fit.x) * problem.sigma + problem.measured - clean[0]) / NOISE
     if isinstance(truth, Strip):
         misfit *= NOISE / 20.0
@@ -212,7 +212,7 @@ def require_found(truth, but=()):
     # what is left is the noise, and the prediction is that of the truth
     assert 0.93 < fit.cost < 1.05
     assert misfit < 0.15
-    expected = Layout(truth)
+    expected = FitLayout(truth)
     wanted = expected.coordinates(expected.initial())
     for name, _ in truth.effects:
         if EFFECTS[name].is_general:

@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from dearig.model.film.material import Network
 from dearig.model.fitting.broyden import boxed_step, descend_broyden
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from tests.tools.engine import PLAIN, effect, record_of
 
@@ -31,7 +31,7 @@ def record():
 
 def posed(model=AWAY):
     """Problem, start, what is held."""
-    problem = Problem([record()], Layout(model), workers=1)
+    problem = Problem([record()], FitLayout(model), workers=1)
     layout = problem.layout
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True

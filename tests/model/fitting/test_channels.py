@@ -10,7 +10,7 @@ import pytest
 from dearig.model.circuit import loop
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.fitting.channels import Channels, JointProblem, is_electric, results_of
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.channels import (
     CURRENT,
@@ -190,7 +190,7 @@ def problem_of(effects, electric):
     given = drive()
     seen = electric.displacement - electric.displacement[:LEAD_IN].mean()
     fitted = ActuatorRecord("made", given, seen, 1e-6, lead_in=LEAD_IN, electric=electric)
-    layout = Layout(model)
+    layout = FitLayout(model)
     joint = JointProblem([fitted], layout, None, Channels([electric], PLAIN))
     return joint, WhitenedProblem([fitted], layout)
 

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from dearig.model.effects import EFFECTS, PLACES
 from dearig.model.fitting.drift import record_drift
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Drive
@@ -34,7 +34,7 @@ def drifting(seed: int, sizes: np.ndarray) -> ActuatorRecord:
 
 def problem_of(records, model=WITH_DRIFT) -> tuple[Problem, np.ndarray, np.ndarray]:
     """A problem, coordinates (d,), and what is held: limits."""
-    problem = Problem(records, Layout(model), workers=1)
+    problem = Problem(records, FitLayout(model), workers=1)
     layout = problem.layout
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True
@@ -76,7 +76,7 @@ def test_shared_parameters_and_drift_equal_those_of_one_joint_fit():
     fit = descend(problem, start, held, gain=1e-6)
     found = problem.fit_drift(fit.x)
     shared = ~held & ~problem.own
-    plain = Problem(TWO, Layout(PLAIN), workers=1)
+    plain = Problem(TWO, FitLayout(PLAIN), workers=1)
     k, own = int(shared.sum()), DRIFT_AMPLITUDES.size
     scale = np.concatenate([np.maximum(np.abs(start[shared]), 1.0), np.full(own, 1e-6)])
 

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from dearig.model.errors import ModelError
 from dearig.model.film.material import Load, Network
 from dearig.model.fitting.hierarchy import fit_shared
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from tests.tools.engine import PLAIN, record_of, thesis_drive
 
@@ -50,7 +50,7 @@ def by_name(estimates):
 
 def stacked():
     """Residuals of the same fit as one least squares over all coordinates, and the found point."""
-    layout = Layout(PLAIN, permittivity=True)
+    layout = FitLayout(PLAIN, permittivity=True)
     problems = [Problem([record], layout, workers=1) for record in records()]
     held = {e.name for e in shared().estimates[0] if e.note == "held"}
     common = [j for j, n in enumerate(layout.names) if n not in (*OWN, *held)]

@@ -31,7 +31,7 @@ from dearig.model.fitting.intervals import (
 )
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parallel import parallel_map
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Algorithm1, algorithm_1
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
@@ -190,7 +190,7 @@ def test_a_film_of_two_branches_is_found_again():
 def test_a_population_is_its_members(workers):
     records = [made(ONE), made(TABLE_3, rate=50.0)]
     model = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
-    layout = Layout(model)
+    layout = FitLayout(model)
     values = np.array([layout.initial() * f for f in (1.0, 0.7, 1.3)])
     values[1, layout.column("mu")] = 0.0  # cannot carry the load
     predicted, status = Problem(records, layout, workers).predict(values)
@@ -215,7 +215,7 @@ def test_what_does_not_fit_is_said():
 
 def test_algorithm_1_as_printed_improves_with_its_generations(monkeypatch):
     record = made(TABLE_3, rate=50.0)
-    problem = Problem([record], Layout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)))
+    problem = Problem([record], FitLayout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)))
     seen = []
 
     def rms(generations):
@@ -278,7 +278,7 @@ def short():
 
 
 def test_layout_names_and_order():
-    layout = Layout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
+    layout = FitLayout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
     names = "mu_0 mu_1 mu_2 mu_3 J_0 J_1 J_2 J_3 T_1 T_2 T_3"
     assert layout.names == tuple(names.split())
     values = layout.initial()
@@ -293,7 +293,7 @@ def test_layout_names_and_order():
 def test_differences_look_across_kinks_and_turns():
     def springs(*effects):
         base = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects)
-        layout = Layout(base)
+        layout = FitLayout(base)
         return layout.differences(layout.coordinates(layout.initial()))[:4]
 
     plain = springs()
@@ -305,7 +305,7 @@ def test_differences_look_across_kinks_and_turns():
 
 @pytest.mark.parametrize("time", [0.0, 0.4])
 def test_a_model_of_fewer_branches_is_padded_with_weak_ones(time):
-    layout = Layout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
+    layout = FitLayout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
     fewer = Network.gent((45e3, 60e3), (1e4, 1e4), (time,))
     built = layout.build(layout.values(layout.padded(fewer)))
     assert [s.modulus for s in built.springs] == pytest.approx([45e3, 60e3, 60.0, 0.06])
@@ -314,11 +314,11 @@ def test_a_model_of_fewer_branches_is_padded_with_weak_ones(time):
 
 def test_neo_hookean_springs_have_no_limit_to_fit():
     network = Network(Spring(1e4, kind="neo-hookean"), (Branch(Spring(1e4, 9.0), 1.0),))
-    assert Layout(Strip(network)).names == ("mu_0", "mu_1", "J_1", "T_1")
+    assert FitLayout(Strip(network)).names == ("mu_0", "mu_1", "J_1", "T_1")
 
 
 def test_a_descent_finds_the_bottom_from_nearby():
-    problem = Problem([made(ONE)], Layout(Actuator(THESIS_FILM, THESIS_LOAD, ONE)))
+    problem = Problem([made(ONE)], FitLayout(Actuator(THESIS_FILM, THESIS_LOAD, ONE)))
     truth = problem.layout.coordinates(problem.layout.initial())
     start = truth + np.array([500.0, -8e3, 0.0, 0.0, 0.4])
     fixed = np.array([False, False, True, True, False])
@@ -470,7 +470,7 @@ def test_records_of_any_length_are_shared_out_evenly():
         drive=Drive(np.arange(3 * drive.time.size) * 0.01, np.tile(drive.voltage, 3)),
         displacement=np.tile(short.displacement, 3),
     )
-    problem = Problem([short, long], Layout(plain), 2, kernel.QUICK)
+    problem = Problem([short, long], FitLayout(plain), 2, kernel.QUICK)
     lengths = [r.drive.time.size for r in problem.records]
     for members in (1, 2, 3, 8):
         shares = problem._shared_out(np.zeros(members, dtype=bool))
@@ -481,7 +481,7 @@ def test_records_of_any_length_are_shared_out_evenly():
     assert loads[0] == loads[1]
     # and whoever simulates them, they say the same
     several = np.tile(problem.layout.initial(), (3, 1)) * np.array([[1.0], [1.1], [0.9]])
-    one_by_one = Problem([short, long], Layout(plain), 1, kernel.QUICK).predict(several)[0]
+    one_by_one = Problem([short, long], FitLayout(plain), 1, kernel.QUICK).predict(several)[0]
     np.testing.assert_array_equal(problem.predict(several)[0], one_by_one)
 
 
@@ -489,7 +489,7 @@ def test_a_film_is_simulated_once_however_it_is_read():
     record = replace(made(ONE), lag=2e-3, lead_in=50, means_of=2)
     sensed = (*effect("sensor curvature", quadratic=3.0), *effect("sensor lag", time_constant=0.02))
     model = Actuator(THESIS_FILM, THESIS_LOAD, ONE, effects=sensed)
-    problem = Problem([record], Layout(model), 1, kernel.QUICK)
+    problem = Problem([record], FitLayout(model), 1, kernel.QUICK)
     layout = problem.layout
     values = np.tile(layout.initial(), (6, 1))
     values[1, layout.names.index("sensor curvature: quadratic")] = -4.0
@@ -516,8 +516,8 @@ def test_work_is_counted_in_steps_and_in_populations():
     told = []
 
     def work(model, fidelity=kernel.QUICK, members=1):
-        problem = Problem([record], Layout(model), 1, fidelity, lambda *work: told.append(work))
-        problem.predict(np.tile(Layout(model).initial(), (members, 1)))
+        problem = Problem([record], FitLayout(model), 1, fidelity, lambda *work: told.append(work))
+        problem.predict(np.tile(FitLayout(model).initial(), (members, 1)))
         return told[-1]
 
     samples = record.drive.time.size

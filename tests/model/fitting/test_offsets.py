@@ -9,7 +9,7 @@ import pytest
 
 from dearig.model.fitting.intervals import covariance
 from dearig.model.fitting.offsets import Offsets, centred
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import counted
 from tests.tools.engine import PLAIN, masked, posed, record_of
@@ -51,7 +51,7 @@ def test_a_shifted_recording_gives_the_same_residuals() -> None:
 
 
 def test_each_record_has_its_own_offset() -> None:
-    layout = Layout(PLAIN)
+    layout = FitLayout(PLAIN)
     x = layout.coordinates(layout.initial())
     moved = [replace(RECORD, displacement=RECORD.displacement + s) for s in (3e-5, -2e-5)]
     both = Problem(moved, layout, workers=1).residuals(x)

@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 
 from dearig.model.diagnosis.fits import Fitter
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.slow_noise import (
     Drift,
     DriftSpace,
@@ -88,7 +88,7 @@ def test_modes_are_counted_from_the_lead_in_and_absent_where_masked() -> None:
 
 def test_a_whitened_problem_has_whitened_residuals() -> None:
     record = record_of(PLAIN)
-    layout = Layout(PLAIN)
+    layout = FitLayout(PLAIN)
     x = layout.coordinates(layout.initial())
     plain = WhitenedProblem([record], layout, workers=1).residuals(x)
     drift = Drift(DriftSpace([drift_modes(record, 8)]), 50.0)

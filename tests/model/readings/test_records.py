@@ -9,7 +9,7 @@ import pytest
 from dearig.model.errors import ModelError
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.film.sensor import at_sensor
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.measures import errors
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, counted
@@ -185,7 +185,7 @@ def test_what_moves_before_it_is_driven_is_counted_from_there():
     assert lead_in > 50
     shown = response.displacement - response.displacement[:lead_in].mean()
     record = ActuatorRecord("drifting", drive, shown, 1e-6, lead_in=lead_in)
-    problem = Problem([record], Layout(drifting))
+    problem = Problem([record], FitLayout(drifting))
     residuals = problem.residuals(problem.layout.coordinates(problem.layout.initial()))
     np.testing.assert_allclose(residuals, 0.0, atol=1e-6)
     assert record.coarse(20.0).lead_in == pytest.approx(lead_in / 5, abs=1)

@@ -502,3 +502,24 @@ def test_dates_with_months_first_in_json_and_workbooks(tmp_path: Path) -> None:
     book.save(tmp_path / "dates.xlsx")
     for path in (as_json, tmp_path / "dates.xlsx"):
         np.testing.assert_allclose(taken(path).time, np.arange(6.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "what"),
+    [
+        ("run.mf4", b"MDF     4.10    asammdf ", "MDF"),
+        ("run.csv", b"MDF     4.10    asammdf ", "MDF"),
+        ("qcodes.db", b"SQLite format 3\0", "SQLite"),
+        ("run.csv.gz", b"\x1f\x8b\x08\0", "gzip"),
+        ("run.csv", b"\x1f\x8b\x08\0", "gzip"),
+        ("run.nc", b"CDF\x01\0\0\0\0", "netCDF"),
+        ("run.npy", b"\x93NUMPY\x01\0", "NumPy"),
+    ],
+)
+def test_a_known_format_that_is_not_read_is_named(
+    tmp_path: Path, name: str, first: bytes, what: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(first + bytes(100))
+    with refused(rf"{what}.* is not read: "):
+        import_file(path, tmp_path / "out.h5")

@@ -15,7 +15,7 @@ from dearig.recording.importers import Imported, ImportOptions
 from dearig.recording.importers.formats.text_file import TextFile
 from dearig.recording.importers.listing import preview
 from dearig.recording.importers.quantities.labels import label_of, target_of
-from dearig.recording.importers.quantities.units import Scale
+from dearig.recording.importers.quantities.units import UnitScale
 from tests.tools.imports import MOVED, ROWS, TIME, VOLTAGE, refused, same
 from tests.tools.recordings import Clock
 
@@ -176,7 +176,7 @@ def test_a_scale_and_the_rig_files_scaling(tmp_path: Path) -> None:
     text = table("time_s,TREK monitor (V),Laser (V)", (1, 1e-3, 250.0))  # 1 V/kV, 4 mm/V
     columns = {"voltage_kV": "TREK monitor (V)*1", "displacement_mm": "Laser (V)*4"}
     same(taken(tmp_path, text, columns=columns))
-    raw = {"voltage_monitor": Scale(1e3), "displacement": Scale(4.0, 1e3)}
+    raw = {"voltage_monitor": UnitScale(1e3), "displacement": UnitScale(4.0, 1e3)}
     same(taken(tmp_path, text, raw=raw))
     offset = {"voltage_V": "#2*1e3+5", "displacement_m": "#3/250", "time_s": "#1"}
     run = taken(tmp_path, text, columns=offset)

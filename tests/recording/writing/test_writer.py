@@ -14,7 +14,6 @@ from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import DearigError, InputError, InstrumentFault
 from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Film, Load
 from dearig.recording import open_recording, recover
-from dearig.recording.content.provenance import git_revision
 from dearig.recording.verify import verify
 from dearig.recording.writing import writer as writer_module
 from tests.tools.recordings import CHANNELS, IDENTITY, RATE, SEQUENCE, Clock, run_counts
@@ -375,10 +374,6 @@ def test_other_films_and_loads_come_back(tmp_path: Path) -> None:
         recorder.append(Block(0, run_counts(100), (Event(0, "info", "go"),)))
     run = open_recording(tmp_path / "run.h5")
     assert (run.film, run.load, run.kinematics) == (film, load, "uniaxial")
-
-
-def test_a_copy_outside_a_checkout_has_no_revision(tmp_path: Path) -> None:
-    assert git_revision(tmp_path) == ""
 
 
 def test_flushes_are_due_four_times_a_second() -> None:

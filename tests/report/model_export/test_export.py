@@ -145,7 +145,7 @@ def test_the_page_has_the_equations_with_numbers_and_intervals() -> None:
     assert r"film\_7 \& more" in page
     (gauge,) = (line for line in page.splitlines() if "gauge relative" in line)
     assert "13.6" in gauge
-    assert "[$13.50$, $13.70$]" in gauge
+    assert "[$13.500$, $13.700$]" in gauge
     for opened in re.findall(r"\\begin\{(\w+\*?)\}", page):
         assert page.count(f"\\begin{{{opened}}}") == page.count(f"\\end{{{opened}}}")
 

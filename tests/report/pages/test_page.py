@@ -230,13 +230,41 @@ class TestNumbers:
         ("value", "low", "high", "text", "within"),
         [
             (45.7724, 45.65, 45.89, "45.77", "45.65 to 45.89"),
-            (83.0023, 83.0023, 83.0023, "83.002", "83 to 83"),
+            (83.0023, 83.0023, 83.0023, "83.002", "83.002 to 83.002"),
             (1e4, 59.6, math.inf, "10000", "above 60"),
             (1e4, 0.0, math.inf, "10000", "open"),
             (20.3, 0.0, 91.5, "20", "below 92"),
             (0.36, 0.0195, 0.37, "0.36", "0.019 to 0.37"),
             (45772.4, 44000.0, 48000.0, "45800", "44000 to 48000"),
-            (2.32465, 2.3246499, 2.3246501, "2.32465", "2.32465 to 2.32465"),
+            (2.32465, 2.3246499, 2.3246501, "2.32465000", "2.32464990 to 2.32465010"),
+            (
+                48.65e6,
+                48.51e6,
+                48.79e6,
+                "4.865 \N{MULTIPLICATION SIGN} 10⁷",
+                "4.851 \N{MULTIPLICATION SIGN} 10⁷ to 4.879 \N{MULTIPLICATION SIGN} 10⁷",
+            ),
+            (
+                1.234e-5,
+                1.2e-5,
+                1.27e-5,
+                "1.234 \N{MULTIPLICATION SIGN} 10⁻⁵",
+                "1.200 \N{MULTIPLICATION SIGN} 10⁻⁵ to 1.270 \N{MULTIPLICATION SIGN} 10⁻⁵",
+            ),
+            (
+                -3.2e6,
+                -4.0e6,
+                -2.4e6,
+                "-3.20 \N{MULTIPLICATION SIGN} 10⁶",
+                "-4.00 \N{MULTIPLICATION SIGN} 10⁶ to -2.40 \N{MULTIPLICATION SIGN} 10⁶",
+            ),
+            (
+                999_990.0,
+                999_900.0,
+                1_000_080.0,
+                "999990",
+                "0.999900 \N{MULTIPLICATION SIGN} 10⁶ to 1.000080 \N{MULTIPLICATION SIGN} 10⁶",
+            ),
         ],
     )
     def test_digits_follow_the_interval(self, value, low, high, text, within):

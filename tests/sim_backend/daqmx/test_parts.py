@@ -16,7 +16,7 @@ from dearig.sim_backend.daqmx.card.names import named
 from dearig.sim_backend.daqmx.card.state import CardState
 from dearig.sim_backend.daqmx.card.tasks import Kind, Task
 from dearig.sim_backend.daqmx.card.terminals import Terminals
-from dearig.sim_backend.daqmx.card.work import Samples
+from dearig.sim_backend.daqmx.card.work import CardSamples
 from dearig.sim_backend.daqmx.digital.watchdogs import Watchdogs
 from dearig.sim_backend.daqmx.setup.timing import Timing
 
@@ -27,7 +27,7 @@ def _state() -> CardState:
 
 @pytest.mark.parametrize("room", [0, 1, 7, 100])
 def test_samples_are_kept_for_as_long_as_the_buffer_holds_them(room):
-    samples = Samples(1, room, np.int64)
+    samples = CardSamples(1, room, np.int64)
     assert samples.between(0, 0).shape == (1, 0)
     for first in range(0, 1000, 3):
         samples.append(np.arange(first, first + 3)[np.newaxis])

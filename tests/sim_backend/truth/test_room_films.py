@@ -10,7 +10,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.effects_contract import values_of
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.environment import CELSIUS, HUMIDITY
 from dearig.model.readings.records import ActuatorRecord
@@ -58,7 +58,7 @@ def records(form, seed: int = 0) -> list[ActuatorRecord]:
 def cost(made: list[ActuatorRecord], effects: tuple) -> tuple[float, dict[str, float]]:
     """Return the mean square of what a fit leaves, in noises, and the numbers that it finds."""
     model = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects)
-    problem = Problem(made, Layout(model), workers=1)
+    problem = Problem(made, FitLayout(model), workers=1)
     layout = problem.layout
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True

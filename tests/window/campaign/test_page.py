@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.acquisition.interrupts import Interrupts
-from dearig.batch.after import Computed
+from dearig.batch.after import AfterRun
 from dearig.batch.journal import JOURNAL
 from dearig.batch.watching import seen
 from dearig.config.campaignfile import parse_campaign
@@ -28,7 +28,7 @@ from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.jobs.worker_process import WorkerMessage
 from dearig.window.run.runner import Play, Runner
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 from dearig.window.shell.frame import MainWindow
 from tests.window.conftest import press
 from tests.window.run.test_stories import click
@@ -80,7 +80,7 @@ def page(
 
 
 def write(page: CampaignPage, plan: str, folder: Path) -> None:
-    page.plan.restore(plan, TextFile("plan", plan, None, folder))
+    page.plan.restore(plan, EditedFile("plan", plan, None, folder))
 
 
 def surveyed(qtbot: QtBot, page: CampaignPage) -> None:
@@ -333,14 +333,14 @@ def test_what_is_computed_after_a_run_is_ended_by_stop_and_its_faults_are_noted(
     monkeypatch.setattr(apart, "_started", lambda: ours)
     stages: list[str] = []
 
-    def compute(*answers: WorkerMessage) -> Computed:
+    def compute(*answers: WorkerMessage) -> AfterRun:
         for answer in answers:
             theirs.send(answer)
         return apart(
             campaign, tmp_path / "a.h5", tmp_path, "", RIG, lambda stage, _: stages.append(stage)
         )
 
-    done = Computed(numbers={"mu_0_kPa": 40.0})
+    done = AfterRun(numbers={"mu_0_kPa": 40.0})
     assert (
         compute(WorkerMessage(1, "progress", ("fitting", 0.5)), WorkerMessage(1, "done", done))
         == done

@@ -15,7 +15,7 @@ from dearig.errors import InputError
 from dearig.window.campaign.plan import PlanEditor
 from dearig.window.campaign.plan_form import key_text, read_values, values_text
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 LEFT = Qt.MouseButton.LeftButton
 PLAN = """\
@@ -42,7 +42,7 @@ def editor(session: Session, qtbot: QtBot, tmp_path: Path) -> PlanEditor:
     (tmp_path / "lobe.toml").write_text(LOBE)
     made = PlanEditor(session)
     qtbot.addWidget(made)
-    made.restore(PLAN, TextFile("plan", PLAN, None, tmp_path))
+    made.restore(PLAN, EditedFile("plan", PLAN, None, tmp_path))
     made.show()
     return made
 

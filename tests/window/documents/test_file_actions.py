@@ -10,17 +10,17 @@ from pytestqt.qtbot import QtBot
 
 from dearig.window.documents.file_actions import FileActions
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 
 
 class Editor(QWidget):
-    def __init__(self, session: Session, file: TextFile) -> None:
+    def __init__(self, session: Session, file: EditedFile) -> None:
         super().__init__()
         self.text, self.file = file.saved, file
         self.files = FileActions(self, session, "rig file", lambda: (self.text, self.file))
         self.files.opened.connect(self.take)
 
-    def take(self, text: str, file: TextFile) -> None:
+    def take(self, text: str, file: EditedFile) -> None:
         self.text, self.file = text, file
 
     def close_work(self) -> None:
@@ -32,7 +32,7 @@ def test_a_dialog_begins_where_the_text_comes_from(
     session: Session, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, known: str
 ) -> None:
     path = tmp_path / "mine.toml"
-    file = TextFile(
+    file = EditedFile(
         "rig file",
         "",
         path if known == "file" else None,
@@ -57,7 +57,7 @@ def test_a_chosen_file_is_read_and_saved_again(
 ) -> None:
     path = tmp_path / "mine.toml"
     path.write_text("a = 1\n")
-    editor = Editor(session, TextFile("rig file", ""))
+    editor = Editor(session, EditedFile("rig file", ""))
     qtbot.addWidget(editor)
     with qtbot.waitSignal(editor.files.opened):
         editor.files.open(path)

@@ -116,7 +116,7 @@ def test_without_a_run_m_does_nothing(qtbot: QtBot, window: MainWindow) -> None:
     assert not bar.note.isEnabled()
     assert "while a run goes on" in bar.note.placeholderText()
     bar.mark()  # by a key that was pressed in the last moment
-    assert window.status.text() == "No mark was set: no run is in progress"
+    assert window.status.full_text == "No mark was set: no run is in progress"
 
 
 def test_alarms_of_a_run_have_time_level_and_acknowledgement(
@@ -137,13 +137,13 @@ def test_alarms_of_a_run_have_time_level_and_acknowledgement(
     assert row[4] == ""
     assert alarms.pending >= 2  # the trip, and the end of the run
     assert not bar.button.isEnabled()
-    assert bar.words.text().endswith("to acknowledge: enter your name in Operator")
+    assert bar.words.full_text.endswith("to acknowledge: enter your name in Operator")
     run_page.operator.setText("Ada")
     click(qtbot, bar.button)
     assert alarms.pending == 0
     row = next(r for r in table.rows() if "interlock" in r[3])
     assert row[4].startswith("Ada, ")
-    assert bar.words.text() == ""
+    assert bar.words.full_text == ""
 
 
 def test_an_acknowledgement_during_a_run_is_recorded(qtbot: QtBot, going: RunPage) -> None:

@@ -119,7 +119,7 @@ def test_a_lost_rig_is_unknown_everywhere_while_the_run_still_waits(
     assert page.display.view.words.text().startswith("Ending")
     page._update_readouts()
     assert page.controls.time_left.text() == "Output unknown, the run is ending"
-    assert page.controls.segment.text() == ""
+    assert page.controls.segment.full_text == ""
     page.stop()
     qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)
 

@@ -200,7 +200,7 @@ def test_every_bad_file_has_one_row_with_words(
     assert "is truncated" in ended["cut"]
     assert ended["running"] != ""
     assert len(ended) == 6
-    assert page.count.text().startswith("6 recordings")
+    assert page.count.full_text.startswith("6 recordings")
     page.subfolders.click()
     qtbot.waitUntil(lambda: page.files.rowCount() == 5, timeout=_PATIENCE)
     running.discard()
@@ -248,7 +248,7 @@ def test_tags_are_given_to_several_and_kept_beside_the_recordings(
     kept = json.loads((good.parent / TAGS_FILE).read_text())
     assert [row["tags"] for row in kept["recordings"]] == [["film 3", "best"]]
     page.filter.setText("best")
-    assert page.count.text().startswith("1 of 5 recordings")
+    assert page.count.full_text.startswith("1 of 5 recordings")
     page.filter.clear()
 
     # another window, and a folder whose file of tags is damaged
@@ -281,7 +281,7 @@ def test_a_trend_has_a_point_for_each_run_of_a_film_that_selects_it(
     assert [value for *_, value in points] == [1.0, 4.0, 10.0]
     times = [time for _, time, _ in points]
     assert np.diff(times).tolist() == [3 * DAY, 6 * DAY]
-    assert "3 runs; 1 without this number" in plot.words.text()
+    assert "3 runs; 1 without this number" in plot.words.full_text
     assert plot.plot.getAxis("left").labelText == "Peak voltage (kV)"
     # the faulty one is told apart without colours
     drawn = {curve.title: curve for curve in plot.plot.drawn}

@@ -102,7 +102,7 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
     # words find a recording
     qtbot.keyClicks(page.filter, "grace film")
     assert set(cells(page, "Sequence")) == {"high"}
-    qtbot.waitUntil(lambda: page.count.text() == "1 of 2 recordings", timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: page.count.full_text == "1 of 2 recordings", timeout=_PATIENCE)
     page.filter.clear()
     assert set(cells(page, "Sequence")) == {"low", "high"}
 
@@ -220,7 +220,7 @@ def test_the_list_follows_the_folder(session, folder, keep, qtbot, tmp_path):
     fresh.mkdir()
     session.set_folder(fresh)
     qtbot.waitUntil(lambda: not page.folder_message.isVisible(), timeout=_PATIENCE)
-    assert page.count.text() == "no recordings yet"
+    assert page.count.full_text == "no recordings yet"
 
 
 def test_nothing_of_one_folder_is_said_of_the_next(session, keep, qtbot, tmp_path):
@@ -238,7 +238,7 @@ def test_what_is_being_read_says_so(session: Session, keep: Keep, qtbot: QtBot) 
     made(session.folder, "first")
     page = open_page(session, keep, qtbot)
     page.choose([session.folder / "first.h5"])
-    qtbot.waitUntil(lambda: "reading curves …" in page.count.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "reading curves …" in page.count.full_text, timeout=_PATIENCE)
     # an earlier choice of the page itself may have drawn it: this one is read too
-    qtbot.waitUntil(lambda: "reading" not in page.count.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "reading" not in page.count.full_text, timeout=_PATIENCE)
     drawn(page, qtbot, "first")

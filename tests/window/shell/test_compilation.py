@@ -68,7 +68,7 @@ def test_first_start_says_what_it_does_and_leaves_the_pages_usable(first_start, 
     session = window.session
     bar = window.findChild(CompilationBar)
     assert bar.isVisible()
-    assert bar.words.text().startswith("Compiling the model once, about a minute: ")
+    assert bar.words.full_text.startswith("Compiling the model once, about a minute: ")
     assert (bar.bar.minimum(), bar.bar.maximum()) == (0, 0)
     assert not window.run_page.arm_button.isEnabled()
     assert window.run_page.display.view.words.text() == "Planned: the plan is being made …"

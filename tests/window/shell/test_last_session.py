@@ -177,10 +177,10 @@ def test_the_rig_file_comes_back_and_is_named(ini: Path, tmp_path: Path, qtbot: 
     assert again.rig_file.limits.voltage_max_kV == 4.0
     window = MainWindow(again)
     qtbot.addWidget(window)
-    assert "rig sim, lab.toml" in window.rig_and_folder.text()
+    assert "rig sim, lab.toml" in window.rig_and_folder.full_text
     assert window.run_page.controls.rig.full_text == "sim with lab.toml"
     again.set_rig_file(None, "", RigFile())
-    assert "rig sim, the rig file of the thesis" in window.rig_and_folder.text()
+    assert "rig sim, the rig file of the thesis" in window.rig_and_folder.full_text
     window.leave()
     assert start(ini, tmp_path)[0].rig_path is None
 

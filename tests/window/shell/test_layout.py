@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import QPoint, QRect
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.units import name_and_unit
@@ -15,10 +15,14 @@ from dearig.window.campaign.page import CampaignPage
 from dearig.window.documents.toml_editor import TomlEditor
 from dearig.window.follow.page import FollowPage
 from dearig.window.high_voltage.status import LatchedAlarm
+from dearig.window.jobs.worker import Worker
+from dearig.window.recordings.page import RecordingsPage
+from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
 from tests.window.conftest import SHORT, press
+from tests.window.made_recordings import made
 from tests.window.shown_text import commands, cut_off, overlapping
 
 #: The screen of a small notebook, a large one, and the small one at a scale of 1.5 without the
@@ -59,6 +63,12 @@ def test_nothing_is_cut_or_covered_on_any_page_at_three_sizes(
     for page in window.pages:
         window.show_page(page)
         found += wrong(window, qtbot, page.title)
+    rig = window.page(RigPage)
+    window.show_page(rig)
+    rig.instruments.setCurrentWidget(rig.live)
+    rig.live.start()
+    qtbot.waitUntil(lambda: rig.live.table.rowCount() > 0, timeout=PATIENCE)
+    found += wrong(window, qtbot, "Rig, live values")
     window.session.block("test", f"rig file: {LONG}", "Rig")
     status.run_ended(LatchedAlarm("Stopped by an interlock", LONG, time.time(), "sim"))
     for page in window.pages:
@@ -76,6 +86,55 @@ def test_nothing_is_cut_or_covered_on_any_page_at_three_sizes(
     for editor in window.findChildren(TomlEditor):
         assert "dearig" not in editor.toml
     assert sorted(set(found)) == [], "\n" + "\n".join(sorted(set(found)))
+
+
+def test_nothing_is_cut_while_work_goes_on(
+    qtbot: QtBot, window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The states of background work are held: no process answers."""
+    monkeypatch.setattr(Worker, "_send", lambda *_: None)
+    session, run = window.session, window.run_page
+    for name in ("first", "second"):
+        made(session.folder, name)
+    recordings, study = window.page(RecordingsPage), window.page(StudyPage)
+    campaign = window.page(CampaignPage)
+    session.set_folder(session.folder / "..")
+    session.set_folder(session.folder / "recordings")
+    found: set[str] = set()
+
+    def look(state: str) -> None:
+        found.update(f"{state}: {text}" for text in cut_off(window))
+
+    for size in SIZES:
+        window.resize(*size)
+        window.show_page(recordings)
+        recordings.filter.setText("first")
+        qtbot.waitUntil(lambda: recordings.count.full_text.endswith("2 to read"), timeout=PATIENCE)
+        look(f"recordings to read at {size[0]}")
+        recordings.choose(recordings._library.files)
+        qtbot.waitUntil(lambda: "curves" in recordings.count.full_text, timeout=PATIENCE)
+        look(f"curves to read at {size[0]}")
+        if size == SIZES[0]:  # there is room for all of it
+            qtbot.waitUntil(lambda: recordings.count.text() == recordings.count.full_text)
+        recordings.filter.clear()
+        recordings.table.clearSelection()
+        recordings.views.setCurrentWidget(recordings.trend)
+        look(f"trend to read at {size[0]}")
+        recordings.views.setCurrentIndex(0)
+        window.show_page(study)
+        study.choice.search.setText("first")
+        look(f"searched at {size[0]}")
+        study.choice.search.clear()
+        window.show_page(run)
+        run.controls._model_titles[0].show_text(LONG)
+        run.controls.segment.show_text(f"playing: {LONG}")
+        look(f"long names at {size[0]}")
+        window.show_page(campaign)
+        campaign.controls.present.show_text(LONG)
+        campaign.controls.time_left.setText("12345.6 s left")
+        session.message.emit(LONG)
+        look(f"long message at {size[0]}")
+    assert sorted(found) == []
 
 
 def places(window: MainWindow) -> list[QRect]:
@@ -129,7 +188,7 @@ def test_every_notice_can_be_read_whole_and_leads_to_its_page(
     assert window.banners.all_button.text() == "All 2 …"
     window.banners.all_button.click()
     shown = next(w for w in window.banners.children() if isinstance(w, QWidget) and w.isWindow())
-    texts = [label.text() for label in shown.findChildren(type(window.status))]
+    texts = [label.text() for label in shown.findChildren(QLabel)]
     assert any(LONG in text for text in texts)
     assert cut_off(shown) == []
     next(b for b in shown.findChildren(type(window.banners.all_button)) if b.isVisible()).click()

@@ -13,7 +13,7 @@ import dearig.window
 from dearig.window.kit.theme import LIGHT
 from dearig.window.session.page import Page
 from dearig.window.session.state import Session
-from dearig.window.session.text_file import TextFile
+from dearig.window.session.text_file import EditedFile
 from dearig.window.shell import frame
 from dearig.window.shell.frame import MainWindow
 from dearig.window.shell.pages import PAGES
@@ -36,7 +36,7 @@ class NotesPage(Page):
     def close_work(self) -> None:
         self.done.append("closed")
 
-    def restore(self, text: str, file: TextFile) -> None:
+    def restore(self, text: str, file: EditedFile) -> None:
         self.done.append(f"restored {text} of {file.what}")
 
 
@@ -68,7 +68,7 @@ def test_one_line_lists_makes_resets_restores_and_closes_a_page(
     monkeypatch.setattr(
         frame,
         "offer_unsaved",
-        lambda _window, _session, restore: restore["note"]("my text", TextFile("note", "")),
+        lambda _window, _session, restore: restore["note"]("my text", EditedFile("note", "")),
     )
     window.offer_unsaved()
     window.reset_layout()

@@ -96,7 +96,7 @@ def test_two_hundred_recordings_are_searched_by_name_folder_film_and_date(
     panel = TrainingPanel(table)
     qtbot.addWidget(panel)
     panel.show()
-    assert panel.count.text() == "200"
+    assert panel.count.full_text == "200"
     for text, found in (
         ("042", ["042"]),
         ("film-3/", [f"{n:03d}" for n in range(193, 0, -10)]),
@@ -107,7 +107,7 @@ def test_two_hundred_recordings_are_searched_by_name_folder_film_and_date(
         panel.search.clear()
         qtbot.keyClicks(panel.search, text)
         assert names(table) == found, text
-        assert panel.count.text() == f"{len(found)} of 200"
+        assert panel.count.full_text == f"{len(found)} of 200"
     # a recording that is new while the search stands is searched too
     panel.search.setText("042")
     many.files[Path("other.h5")] = (1000.0, 10)

@@ -19,7 +19,7 @@ from dearig.recording.importers.quantities.labels import (
     target_name,
     target_of,
 )
-from dearig.recording.importers.quantities.units import UNITS, Scale
+from dearig.recording.importers.quantities.units import UNITS, UnitScale
 from dearig.recording.importers.source import Source, listing, no_such_column, part_of
 
 __all__ = ["choose"]
@@ -37,7 +37,7 @@ class _Wanted:
     """What is asked for: columns by target, scales of a rig file; see ``choose``."""
 
     mapping: Mapping[str, str]
-    raw: Mapping[str, Scale]
+    raw: Mapping[str, UnitScale]
     timed: bool
     guess: bool
 
@@ -45,7 +45,7 @@ class _Wanted:
 def choose(
     source: Source,
     mapping: Mapping[str, str],
-    raw: Mapping[str, Scale],
+    raw: Mapping[str, UnitScale],
     *,
     timed: bool,
     table: str | None = None,
@@ -169,7 +169,11 @@ def _leave_other_sizes(chosen: Chosen, asked: set[str]) -> None:
 
 
 def _asked(
-    source: Source, labels: Mapping[str, Label], raw: Mapping[str, Scale], target: Target, text: str
+    source: Source,
+    labels: Mapping[str, Label],
+    raw: Mapping[str, UnitScale],
+    target: Target,
+    text: str,
 ) -> Pick:
     """Return the pick of ``text`` for ``target``. Raises ``InputError`` if it cannot be."""
     column, own = _column(source, text)
@@ -210,7 +214,7 @@ def _asked(
     return Pick(target, column, scale)
 
 
-def _behind(scale: Scale) -> str:
+def _behind(scale: UnitScale) -> str:
     """Return ``scale`` as it stands behind a column in a command line."""
     factor = f"/{scale.over:g}" if scale.over != 1.0 else f"*{scale.times:g}"
     return factor + (f"{scale.plus:+g}" if scale.plus else "")
@@ -230,7 +234,7 @@ def _overruled(pick: Pick, label: Label) -> list[str]:
     ]
 
 
-def _column(source: Source, text: str) -> tuple[str, Scale | None]:
+def _column(source: Source, text: str) -> tuple[str, UnitScale | None]:
     """Return the column that ``text`` names, and the scale behind its name if there is one."""
     if (found := _place(source, text)) is not None:
         return found, None
@@ -246,7 +250,7 @@ def _column(source: Source, text: str) -> tuple[str, Scale | None]:
             if factor == 0.0:
                 raise InputError(f"{text!r}: a scale of 0 leaves nothing")
             divides = match["sign"] == "/"
-            return column, Scale(1.0 if divides else factor, factor if divides else 1.0, plus)
+            return column, UnitScale(1.0 if divides else factor, factor if divides else 1.0, plus)
     source.check(text)  # its error may say more
     raise no_such_column(source, text)
 
@@ -265,9 +269,9 @@ def _place(source: Source, text: str) -> str | None:
     return named[0] if named else None
 
 
-def _both(first: Scale, then: Scale) -> Scale:
+def _both(first: UnitScale, then: UnitScale) -> UnitScale:
     """Return the scale that applies ``first`` and ``then``."""
-    return Scale(
+    return UnitScale(
         first.times * then.times,
         first.over * then.over,
         first.plus * then.times / then.over + then.plus,

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from dearig.errors import Remedy
 from dearig.recording.importers.quantities.labels import Label, Target, label_of
-from dearig.recording.importers.quantities.units import Scale
+from dearig.recording.importers.quantities.units import UnitScale
 from dearig.recording.importers.source import Source
 
 __all__ = [
@@ -40,7 +40,7 @@ class Pick:
 
     target: Target
     column: str
-    scale: Scale
+    scale: UnitScale
     behind: str = ""  # what stands behind the column in a command line, such as *FACTOR
     #: what of it is a guess: "column", "unit" or "scale"; "" where it is sure
     doubt: str = ""

@@ -22,7 +22,7 @@ from dearig.recording.importers.quantities.labels import (
     target_of,
 )
 from dearig.recording.importers.quantities.qualifiers import SHEAR
-from dearig.recording.importers.quantities.units import UNITS, Scale
+from dearig.recording.importers.quantities.units import UNITS, UnitScale
 from dearig.recording.importers.source import listing
 
 __all__ = ["Guess", "use_monitor"]
@@ -46,7 +46,7 @@ class Guess:
     """Fills what ``chosen`` still needs from the names of the columns."""
 
     def __init__(
-        self, chosen: Chosen, labels: Mapping[str, Label], raw: Mapping[str, Scale], timed: bool
+        self, chosen: Chosen, labels: Mapping[str, Label], raw: Mapping[str, UnitScale], timed: bool
     ) -> None:
         self._chosen, self._labels, self._raw, self._timed = chosen, labels, raw, timed
         taken = {pick.column for pick in chosen.picked.values()}
@@ -325,12 +325,14 @@ class Guess:
     def _propose_scaled(self, target: Target, column: str, several: bool) -> None:
         """Propose ``column`` for ``target``, with a scale that only the user knows."""
         self._chosen.source.check(column)
-        proposed = Pick(target, column, Scale(), behind="*FACTOR", doubt="scale", is_open=several)
+        proposed = Pick(
+            target, column, UnitScale(), behind="*FACTOR", doubt="scale", is_open=several
+        )
         self._chosen.picked[target.quantity] = proposed
         self._free.remove(column)
 
     def _pick(
-        self, target: Target, column: str, scale: Scale, doubt: str = "", *,
+        self, target: Target, column: str, scale: UnitScale, doubt: str = "", *,
         is_open: bool = False, unit: bool = False,
     ) -> None:  # fmt: skip
         self._chosen.source.check(column)
@@ -382,7 +384,7 @@ def _as_compression(chosen: Chosen, labels: Mapping[str, Label]) -> None:
     for pick in turned:
         scale = pick.scale
         chosen.picked[pick.target.quantity] = replace(
-            pick, scale=Scale(-scale.times, scale.over, -scale.plus), behind="*-1"
+            pick, scale=UnitScale(-scale.times, scale.over, -scale.plus), behind="*-1"
         )
         chosen.notes.append(f"{pick.column!r} is positive in compression: its sign was changed")
     for pick in picks if turned else ():

@@ -9,7 +9,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-__all__ = ["NamedColumns", "Overview", "unseen"]
+__all__ = ["ColumnOverview", "NamedColumns", "unseen"]
 
 
 class _Column(Protocol):
@@ -21,7 +21,7 @@ class _Column(Protocol):
 
 
 @dataclass(frozen=True)
-class Overview:
+class ColumnOverview:
     """First values (k,) of a column, how many it has, and the least and the greatest of them."""
 
     first: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -29,11 +29,11 @@ class Overview:
     low: float = math.inf
     high: float = -math.inf
 
-    def with_values(self, values: np.ndarray, shown: int) -> Overview:
+    def with_values(self, values: np.ndarray, shown: int) -> ColumnOverview:
         """Return the overview with more ``values`` (n,), and ``shown`` first ones at most."""
         if not values.size:
             return self
-        return Overview(
+        return ColumnOverview(
             np.append(self.first, values[: shown - self.first.size]),
             self.count + int(values.size),
             min(self.low, float(values.min())),

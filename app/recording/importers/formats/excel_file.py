@@ -24,7 +24,7 @@ from dearig.recording.files import in_words, one_line
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.formats.columns import unseen
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
-from dearig.recording.importers.formats.text_layout import Layout, TextColumn, layout_of
+from dearig.recording.importers.formats.text_layout import TextColumn, TextLayout, layout_of
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import PARSER_FAILURES, listing, printable
 
@@ -110,7 +110,7 @@ class _Sheet:
         head = list(self._rows(HEAD_ROWS, values=True))
         self._formulas = self._empty_formulas(head)
         lines = ["\t".join(_texts(row, self._formulas, _has_number(row))) for row in head]
-        self.layout: Layout = layout_of("\n".join(lines), "utf-8", path, names_line, ("\t",))
+        self.layout: TextLayout = layout_of("\n".join(lines), "utf-8", path, names_line, ("\t",))
         self._numbers: dict[int, array[float]] | None = None
         self._wrong: dict[tuple[int, int], str] = {}  # by place of the column and row of the sheet
         self._kept = np.empty(0, dtype=np.int64)  # rows of the sheet of what was read last

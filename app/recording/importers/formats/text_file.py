@@ -28,18 +28,18 @@ from dearig.recording.importers.formats.cells import (
     number_in,
     with_order,
 )
-from dearig.recording.importers.formats.columns import NamedColumns, Overview
+from dearig.recording.importers.formats.columns import ColumnOverview, NamedColumns
 from dearig.recording.importers.formats.text_blocks import BytesReader, blocks_of, halves_of
 from dearig.recording.importers.formats.text_layout import (
     HEAD_CHARACTERS,
-    Layout,
     TextColumn,
+    TextLayout,
     cells_of,
     encoding_of,
     holds_data,
     layout_of,
 )
-from dearig.recording.importers.formats.text_sections import Section, sections_of
+from dearig.recording.importers.formats.text_sections import TextSection, sections_of
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.text_numbers import GROUPED, signs_of
 from dearig.recording.importers.source import GapError, no_such_column, skip_or_refuse
@@ -101,11 +101,11 @@ class TextFile(NamedColumns[TextColumn]):
                 f"{path} is a universal file (it begins with a dataset {match[1]}), which is not "
                 f"read: export the signals as text or MAT from the program that made it"
             )
-        self.layout: Layout = layout_of(head, encoding, path, names_line)
+        self.layout: TextLayout = layout_of(head, encoding, path, names_line)
         #: what is known of the program that wrote a table without names
         self.hint = _QCODES if self.layout.names_line < 0 and _OF_QCODES.match(path.name) else ""
         columns = {column.name: column for column in self.layout.columns}
-        self._section_of: dict[str, Section] = {}
+        self._section_of: dict[str, TextSection] = {}
         lines = head.replace("\r\n", "\n").replace("\r", "\n").split("\n")
         sections = sections_of(path, self.layout, lines[self.layout.names_line])
         if sections:
@@ -129,7 +129,7 @@ class TextFile(NamedColumns[TextColumn]):
         self._decided: set[str] = set()  # columns whose signs the whole file has decided
         self._said: list[str] = []
         self._leaves_out, self._counts, self._grouped = skip_bad_rows, False, False
-        self._section = Section("", self.layout.first, None)  # and the table that they are of
+        self._section = TextSection("", self.layout.first, None)  # and the table that they are of
         #: rows before each row that was left out, and its line, in words
         self.skipped: list[tuple[int, str]] = []
         self._spans: list[_Span] = []
@@ -272,16 +272,16 @@ class TextFile(NamedColumns[TextColumn]):
                 if last < len(cells):
                     yield cell_of(cells, column)
 
-    def overview(self, names: Sequence[str], count: int) -> dict[str, Overview]:
+    def overview(self, names: Sequence[str], count: int) -> dict[str, ColumnOverview]:
         """Return the first ``count`` values of columns, how many there are, and their range.
 
         All are read at once. Cells that are no numbers are passed over, in each column by itself.
         """
-        found: dict[str, Overview] = {}
+        found: dict[str, ColumnOverview] = {}
         for section in dict.fromkeys(self._section_of.get(name) for name in names):
             self._section = section or self._section
             self._wanted = [self._columns[n] for n in names if self._section_of.get(n) == section]
-            seen = [Overview() for _ in self._wanted]
+            seen = [ColumnOverview() for _ in self._wanted]
             size, done = self._size, 0
             for _, block, values in self._parsed():
                 columns = self._apart(block) if values is None else values

@@ -31,8 +31,8 @@ from dearig.recording.importers.quantities.units import unit_of
 
 __all__ = [
     "HEAD_CHARACTERS",
-    "Layout",
     "TextColumn",
+    "TextLayout",
     "cells_of",
     "encoding_of",
     "holds_data",
@@ -94,7 +94,7 @@ class TextColumn:
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """Layout of a text table.
 
     ``first`` is the number, from 0, of the first line of data; ``names_line`` that of the names,
@@ -160,7 +160,7 @@ def layout_of(
     path: Path,
     names_line: int | None = None,
     delimiters: Sequence[str | None] = _DELIMITERS,
-) -> Layout:
+) -> TextLayout:
     """Return the layout of the text that begins with ``head``.
 
     ``names_line`` is the number of the line of names, from 1, where the user says it; one of
@@ -258,7 +258,7 @@ class _Table:
                 )
         return None
 
-    def layout(self, encoding: str, path: Path, names_line: int | None) -> Layout:
+    def layout(self, encoding: str, path: Path, names_line: int | None) -> TextLayout:
         """Return the layout of the file, with the names that stand above the table."""
         if self.cells > COLUMNS_MAX:
             raise _too_wide(path, self.cells)
@@ -275,7 +275,7 @@ class _Table:
             for text in self.lines[self.start : used]
             if text.strip()
         )
-        return Layout(
+        return TextLayout(
             encoding, self.delimiter, self.first, line, self.cells, _unique(columns), block,
             self._step(names, units, block), (*notes, *self._passed_over(line)),
         )  # fmt: skip
@@ -581,7 +581,7 @@ def _unique(columns: Sequence[TextColumn]) -> tuple[TextColumn, ...]:
     return tuple(found)
 
 
-def is_row(line: str, layout: Layout) -> bool:
+def is_row(line: str, layout: TextLayout) -> bool:
     """Return True if ``line`` is one of the table's rows, most of whose cells are numbers."""
     if not holds_data(line):
         return False

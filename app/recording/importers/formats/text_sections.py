@@ -11,10 +11,10 @@ from pathlib import Path
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
-from dearig.recording.importers.formats.text_layout import Layout, cells_of, is_row
+from dearig.recording.importers.formats.text_layout import TextLayout, cells_of, is_row
 from dearig.recording.importers.source import printable
 
-__all__ = ["Section", "sections_of"]
+__all__ = ["TextSection", "sections_of"]
 
 #: Bytes of a file in which further tables are looked for; specimens one below another are short.
 SIZE_MAX = 2**26
@@ -28,7 +28,7 @@ _SPECIMEN = re.compile(
 
 
 @dataclass(frozen=True)
-class Section:
+class TextSection:
     """A table: its title, and the numbers, from 0, of its first line and of the one behind it.
 
     ``end`` is None for the last table, which ends with the file.
@@ -39,7 +39,7 @@ class Section:
     end: int | None
 
 
-def sections_of(path: Path, layout: Layout, names: str) -> tuple[Section, ...]:
+def sections_of(path: Path, layout: TextLayout, names: str) -> tuple[TextSection, ...]:
     """Return the tables of the file, whose line of names is ``names``; none if there is only one.
 
     Raises ``InputError`` if the file cannot be read.
@@ -56,7 +56,7 @@ def sections_of(path: Path, layout: Layout, names: str) -> tuple[Section, ...]:
         return ()
     text = raw.decode(layout.encoding, "replace").replace("\r\n", "\n").replace("\r", "\n")
     places = _places(text, names.strip())
-    found: list[Section] = []
+    found: list[TextSection] = []
     number, counted, before = 0, 0, 0  # lines above the place ``counted``; end of the table above
     for place, following in itertools.pairwise([*places, len(text)]):
         number += text.count("\n", counted, place)
@@ -77,7 +77,7 @@ def sections_of(path: Path, layout: Layout, names: str) -> tuple[Section, ...]:
         title = title or str(len(found) + 1)
         if any(section.title == title for section in found):
             title = f"{title} #{len(found) + 1}"
-        found.append(Section(title, number + first, end))
+        found.append(TextSection(title, number + first, end))
         before = behind
     return tuple(found) if len(found) > 1 else ()
 
@@ -104,7 +104,7 @@ def _near(text: str, start: int, end: int, last: bool = False) -> list[str]:
     return text[start : min(end, start + NEAR)].split("\n")
 
 
-def _title(above: Sequence[str], layout: Layout) -> str:
+def _title(above: Sequence[str], layout: TextLayout) -> str:
     """Return what the lines ``above`` a table call it; empty if there are none."""
     told = [line for line in above if line.strip()]
     line = next((line for line in told if _SPECIMEN.search(line)), told[-1] if told else "")

@@ -20,7 +20,7 @@ from dearig.recording.importers.quantities.qualifiers import (
     is_harmful,
     qualifier_in,
 )
-from dearig.recording.importers.quantities.units import UNITS, WIDE_BRACKETS, Scale, unit_of
+from dearig.recording.importers.quantities.units import UNITS, WIDE_BRACKETS, UnitScale, unit_of
 
 __all__ = [
     "DIMENSIONS",
@@ -157,7 +157,7 @@ class Target:
     raw: bool = False
 
     @property
-    def scale(self) -> Scale:
+    def scale(self) -> UnitScale:
         """Scale to the unit of the recording."""
         return UNITS[DIMENSIONS[self.quantity]][self.unit]
 

@@ -7,11 +7,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-__all__ = ["ALIASES", "UNITS", "WIDE_BRACKETS", "Scale", "unit_of"]
+__all__ = ["ALIASES", "UNITS", "WIDE_BRACKETS", "UnitScale", "unit_of"]
 
 
 @dataclass(frozen=True)
-class Scale:
+class UnitScale:
     """Conversion ``values * times / over + plus``; dividing makes 5 mm exactly 0.005 m."""
 
     times: float = 1.0
@@ -30,57 +30,59 @@ class Scale:
 _INCH, _POUND, _GRAM = 0.0254, 4.4482216152605, 9.80665e-3  # m, N, N: exact by definition
 
 #: Scale to the unit of a recording, by dimension and by the symbol of the unit.
-UNITS: MappingProxyType[str, dict[str, Scale]] = MappingProxyType(
+UNITS: MappingProxyType[str, dict[str, UnitScale]] = MappingProxyType(
     {
         "time": {
-            "s": Scale(),
-            "ms": Scale(1.0, 1e3),
-            "us": Scale(1.0, 1e6),
-            "ns": Scale(1.0, 1e9),
-            "min": Scale(60.0),
-            "h": Scale(3600.0),
-            "d": Scale(86400.0),
+            "s": UnitScale(),
+            "ms": UnitScale(1.0, 1e3),
+            "us": UnitScale(1.0, 1e6),
+            "ns": UnitScale(1.0, 1e9),
+            "min": UnitScale(60.0),
+            "h": UnitScale(3600.0),
+            "d": UnitScale(86400.0),
         },
         "voltage": {
-            "V": Scale(), "kV": Scale(1e3), "mV": Scale(1.0, 1e3), "uV": Scale(1.0, 1e6),
-            "MV": Scale(1e6),
+            "V": UnitScale(), "kV": UnitScale(1e3), "mV": UnitScale(1.0, 1e3),
+            "uV": UnitScale(1.0, 1e6), "MV": UnitScale(1e6),
         },
         "length": {
-            "m": Scale(),
-            "cm": Scale(1.0, 1e2),
-            "mm": Scale(1.0, 1e3),
-            "um": Scale(1.0, 1e6),
-            "nm": Scale(1.0, 1e9),
-            "dm": Scale(1.0, 1e1),
-            "inch": Scale(_INCH),
-            "mil": Scale(_INCH, 1e3),
-            "ft": Scale(12.0 * _INCH),
+            "m": UnitScale(),
+            "cm": UnitScale(1.0, 1e2),
+            "mm": UnitScale(1.0, 1e3),
+            "um": UnitScale(1.0, 1e6),
+            "nm": UnitScale(1.0, 1e9),
+            "dm": UnitScale(1.0, 1e1),
+            "inch": UnitScale(_INCH),
+            "mil": UnitScale(_INCH, 1e3),
+            "ft": UnitScale(12.0 * _INCH),
         },
         "force": {
-            "N": Scale(),
-            "mN": Scale(1.0, 1e3),
-            "uN": Scale(1.0, 1e6),
-            "cN": Scale(1.0, 1e2),
-            "kN": Scale(1e3),
-            "gf": Scale(_GRAM),
-            "kgf": Scale(_GRAM * 1e3),
-            "lbf": Scale(_POUND),
+            "N": UnitScale(),
+            "mN": UnitScale(1.0, 1e3),
+            "uN": UnitScale(1.0, 1e6),
+            "cN": UnitScale(1.0, 1e2),
+            "kN": UnitScale(1e3),
+            "gf": UnitScale(_GRAM),
+            "kgf": UnitScale(_GRAM * 1e3),
+            "lbf": UnitScale(_POUND),
         },
         "stress": {
-            "Pa": Scale(), "kPa": Scale(1e3), "MPa": Scale(1e6), "GPa": Scale(1e9),
-            "bar": Scale(1e5), "mbar": Scale(1e2), "psi": Scale(_POUND, _INCH**2),
-            "ksi": Scale(1e3 * _POUND, _INCH**2),
+            "Pa": UnitScale(), "kPa": UnitScale(1e3), "MPa": UnitScale(1e6), "GPa": UnitScale(1e9),
+            "bar": UnitScale(1e5), "mbar": UnitScale(1e2), "psi": UnitScale(_POUND, _INCH**2),
+            "ksi": UnitScale(1e3 * _POUND, _INCH**2),
         },
         "current": {
-            "A": Scale(),
-            "mA": Scale(1.0, 1e3),
-            "uA": Scale(1.0, 1e6),
-            "nA": Scale(1.0, 1e9),
-            "pA": Scale(1.0, 1e12),
+            "A": UnitScale(),
+            "mA": UnitScale(1.0, 1e3),
+            "uA": UnitScale(1.0, 1e6),
+            "nA": UnitScale(1.0, 1e9),
+            "pA": UnitScale(1.0, 1e12),
         },
-        "temperature": {"C": Scale(), "K": Scale(plus=-273.15), "F": Scale(1.0, 1.8, -32 / 1.8)},
-        "strain": {"1": Scale(), "pct": Scale(1.0, 1e2)},
-        "stretch": {"1": Scale()},
+        "temperature": {
+            "C": UnitScale(), "K": UnitScale(plus=-273.15), "F": UnitScale(1.0, 1.8, -32 / 1.8),
+        },
+        "strain": {"1": UnitScale(), "pct": UnitScale(1.0, 1e2)},
+        "stretch": {"1": UnitScale()},
     }
 )  # fmt: skip
 
