@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from dearig.model.diagnosis.channels import ChannelSays
 from dearig.model.diagnosis.engine import Race, SearchResult
 from dearig.model.diagnosis.evidence import Judge, family_of
-from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
+from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter, fit_of, gain_that_ends
 from dearig.model.diagnosis.imposed import lateness
 from dearig.model.diagnosis.results import (
     Candidate,
@@ -21,6 +23,10 @@ from dearig.model.diagnosis.results import (
 from dearig.model.diagnosis.stages import DRIFT_LAW, stage_of
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting.channels import ChannelResult, is_electric, results_of
+from dearig.model.fitting.estimates import MOVES_MAX, BetterPoint
+from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.parameters import Estimate
+from dearig.model.fitting.spare import sums_text
 from dearig.model.residual import (
     MissingStress,
     Signature,
@@ -60,6 +66,28 @@ class Conclusion:
         self.last = self.first
         if found.best.members:
             self.last = fitter.careful(found.best, _ITERATIONS).by_relaxation_time()
+
+    def moved_to(self, x: np.ndarray) -> bool:
+        """Refit the last model from coordinates ``x`` (d,); return whether that is a better fit.
+
+        The search's own fit moves with it: the evidence is that of the reported model.
+        """
+        last = self.last
+        gain = gain_that_ends(last)
+        found = descend(last.problem, x, last.fixed, _ITERATIONS, gain, damping=1e-4)
+        fit = fit_of(last.problem, last.fixed, found)
+        if (last.cost - fit.cost) * last.problem.samples < gain:
+            return False
+        self.last = fit.by_relaxation_time()
+        best = self.found.best
+        if not best.members:
+            self.first = self.last
+            return True
+        refined = self.fitter.refined(replace(best, x=self.last.x))
+        if refined.cost < best.cost:
+            fits = {**self.found.fits, best.members: refined}
+            self.found = replace(self.found, best=refined, fits=fits)
+        return True
 
     @property
     def explained(self) -> float:
@@ -271,16 +299,9 @@ def conclude(
     allowed = fitter.settings.effort * (1.0 + fitter.settings.intervals)
     end = Conclusion(found, fitter, without)
     judge, full = found.judge, fitter.full
-    others = end.for_others()
+    final = _profiled(end, lambda: stop() or fitter.work.effort > allowed)
+    found, others = end.found, end.for_others()
     first = stage_of(end.first, judge, fitter.raw)
-    final = stage_of(
-        end.last,
-        judge,
-        fitter.raw,
-        profiled=fitter.thinned_about(end.last, found.best.drift),
-        for_others=others,
-        ended=lambda: stop() or fitter.work.effort > allowed,
-    )
     steps, rivals = end.steps(final)
     before, after = signatures(full, end.first), signatures(full, end.last)
     models = final.of_each(len(full))
@@ -310,7 +331,7 @@ def conclude(
         simulations=fitter.work.simulations,
         interrupted=found.status == "stopped",
         held=held,
-        notes=tuple(_notes(end, others, after, held)),
+        notes=tuple(_notes(end, others, after, held, final.sums)),
         status=found.status,
         families=_families(end, judge.probabilities(fits, found.sought)),
         marginals=_families(end, judge.marginals(fits, found.sought)),
@@ -318,6 +339,30 @@ def conclude(
         channel_evidence=end.channel_evidence(),
         denials=found.denials,
     )
+
+
+def _profiled(end: Conclusion, ended: Callable[[], bool]) -> Stage:
+    """Return the last model with its intervals, moved to where a profile comes to a better fit."""
+
+    def stage(gain: float) -> Stage:
+        return stage_of(
+            end.last,
+            end.judge,
+            end.fitter.raw,
+            profiled=end.fitter.thinned_about(end.last, end.found.best.drift),
+            for_others=end.for_others(),
+            ended=ended,
+            gain=gain,
+        )
+
+    gain = gain_that_ends(end.last)
+    for _ in range(MOVES_MAX):
+        try:
+            return stage(gain)
+        except BetterPoint as better:
+            # what is none on every sample is an error of the thinned records
+            gain = gain_that_ends(end.last) if end.moved_to(better.x) else better.gained
+    return stage(math.inf)
 
 
 def unnamed_of(
@@ -359,6 +404,7 @@ def _notes(
     others: Actuator | Strip,
     after: Sequence[object],
     held: bool,
+    sums: Sequence[Estimate],
 ) -> list[str]:
     """Return sentences for the operator."""
     said = []
@@ -389,6 +435,8 @@ def _notes(
         )
     said += _own_delays(end)
     said += [denial.text for denial in end.found.denials]
+    if sums:
+        said.append(sums_text(sums))
     if end.is_small and not all(getattr(s, "is_noise", True) for s in after):
         said.append(
             "the residual is not quite white noise, but too small to attribute to an effect"

@@ -44,7 +44,7 @@ from dearig.model.readings.records import ActuatorRecord, Record, counted
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 
-__all__ = ["DRIFT", "Fit", "Fitter", "Work", "fit_of", "with_effect"]
+__all__ = ["DRIFT", "Fit", "Fitter", "Work", "fit_of", "gain_that_ends", "with_effect"]
 
 #: How the marginalised drift is named among the members of a fit.
 DRIFT = "drift"
@@ -425,7 +425,7 @@ class Fitter:
         problem = fit.problem
         if problem.fidelity == kernel.ROUGH:
             problem = self.problem(problem.layout.base, fit.drift)
-        gain = _gain(fit, part)
+        gain = gain_that_ends(fit, part)
         found = descend_broyden(problem, fit.x, fit.fixed, None, 40, gain, True)
         found = descend(problem, found.x, fit.fixed, _TO_THE_END, gain, 1e-3, quick=True)
         return fit_of(problem, fit.fixed, found)
@@ -433,7 +433,7 @@ class Fitter:
     def careful(self, fit: Fit, iterations: int) -> Fit:
         """Return ``fit`` on every sample, with careful steps and two-sided differences."""
         problem = self.careful_problem(fit.model, fit.drift)
-        found = descend(problem, fit.x, fit.fixed, iterations, _gain(fit), damping=1e-4)
+        found = descend(problem, fit.x, fit.fixed, iterations, gain_that_ends(fit), damping=1e-4)
         return fit_of(problem, fit.fixed, found)
 
     def careful_problem(
@@ -529,7 +529,7 @@ class Fitter:
             ),
         ]
         best = min(wide, key=lambda f: f.cost)
-        fixed, gain = best.fixed, _gain(best, REPORTED_TOLERANCE)
+        fixed, gain = best.fixed, gain_that_ends(best, REPORTED_TOLERANCE)
         found = descend(problem, best.x, fixed, _BASELINE_ITERATIONS, gain, 1e-4, quick=True)
         none = np.zeros_like(fixed)
         freed = descend(problem, found.x, none, _BASELINE_ITERATIONS, gain, quick=True)
@@ -564,7 +564,7 @@ class Fitter:
         return fit_of(problem, fixed, found)
 
 
-def _gain(fit: Fit, part: float = _GAIN_PART) -> float:
+def gain_that_ends(fit: Fit, part: float = _GAIN_PART) -> float:
     """Return the gain of chi-square below which a descent from ``fit`` has ended.
 
     Where much more than noise is left, it is a ``part`` of that.

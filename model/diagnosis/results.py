@@ -33,7 +33,8 @@ class Stage:
     ``train_rms``, and ``selection_rms`` and ``selection_max`` (each segment of time predicted by a
     fit to the others), are pooled over the training records, in the measured unit. ``criterion`` is
     the Bayesian information criterion with correlated residuals counted as fewer readings; only
-    differences have a meaning. ``estimates`` are the model's parameters with their intervals.
+    differences have a meaning. ``estimates`` are the model's parameters with their intervals,
+    ``sums`` those of moduli of which the data determine the sum alone.
     ``for_others`` is the model that predicts other recordings, refitted without the effects that
     are specific to these recordings. ``models`` are those of the training records, each with its
     own drift. ``covariance`` (f, f) is that of the fitted parameters ``covariance_names``, in SI
@@ -53,6 +54,7 @@ class Stage:
     covariance_names: tuple[str, ...] = ()
     covariance: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)
     budget: tuple[Contribution, ...] = ()
+    sums: tuple[Estimate, ...] = ()
 
     def of_each(self, records: int) -> tuple[Actuator | Strip, ...]:
         """Return the models of so many training ``records``."""

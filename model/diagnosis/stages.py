@@ -14,7 +14,7 @@ from dearig.model.diagnosis.fits import Fit
 from dearig.model.diagnosis.results import Stage
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting import Estimate
-from dearig.model.fitting.estimates import estimates_with_intervals
+from dearig.model.fitting.estimates import Intervals, estimates_with_intervals
 from dearig.model.fitting.left_out import left_out
 from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.records import ActuatorRecord, Record
@@ -38,12 +38,14 @@ def stage_of(
     profiled: WhitenedProblem | None = None,
     for_others: Actuator | Strip | None = None,
     ended: Callable[[], bool] = lambda: False,
+    gain: float = math.inf,
 ) -> Stage:
     """Return the errors of ``fit``; with ``profiled`` the intervals of its parameters too.
 
     That is a problem with the same optimum, on which their likelihood is profiled until ``ended``.
     ``for_others`` is the model that predicts other recordings, where it is another one. Errors are
-    of readings of the ``full`` records.
+    of readings of the ``full`` records. Raises ``BetterPoint`` where a profile comes to a
+    chi-square that is lower by more than ``gain``.
     """
     problem = fit.problem
     jacobian = problem.jacobian(fit.x, ~fit.fixed, None if profiled else fit.residuals)
@@ -54,14 +56,19 @@ def stage_of(
     reach = problem.layout.reach(fit.x)[~fit.fixed]
     predicted = left_out(fit.residuals, jacobian, reach)[good] * scale
     estimates: tuple[Estimate, ...] = ()
-    names: tuple[str, ...] = ()
-    covariance = np.empty((0, 0))
+    found = Intervals((), (), np.empty((0, 0)))
     if profiled is not None:
         values = problem.layout.values(fit.x)
-        found, names, covariance = estimates_with_intervals(
-            profiled, values, fit.fixed, lambda _: None, lower_ends=False, ended=ended
+        found = estimates_with_intervals(
+            profiled,
+            values,
+            fit.fixed,
+            lambda _: None,
+            lower_ends=False,
+            ended=ended,
+            gain=gain,
         )
-        estimates = (*found, *_drift_estimates(fit))
+        estimates = (*found.estimates, *_drift_estimates(fit))
     return Stage(
         model=fit.model,
         cost=fit.cost,
@@ -70,8 +77,9 @@ def stage_of(
         selection_max=float(np.max(np.abs(predicted))),
         criterion=judge.criterion(fit),
         estimates=estimates,
-        covariance_names=names,
-        covariance=covariance,
+        sums=found.sums,
+        covariance_names=found.names,
+        covariance=found.covariance,
         for_others=for_others or fit.model,
         models=with_drift(fit),
     )

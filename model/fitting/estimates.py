@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
 
-from dearig.model.fitting.intervals import correlation_time, covariance, profile
-from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout
+from dearig.model.fitting.intervals import (
+    BetterPoint,
+    correlation_time,
+    covariance,
+    is_determined,
+    natural_ends,
+)
+from dearig.model.fitting.levenberg import descend, gain_that_counts
+from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
+from dearig.model.fitting.spare import Optimum, valleys_of, widened
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
 __all__ = [
     "AT_BOUND",
     "BY_CURVATURE",
+    "MOVES_MAX",
+    "BetterPoint",
+    "Intervals",
     "at_bound",
     "estimates_with_intervals",
-    "is_determined",
     "recentre",
 ]
 
@@ -30,7 +39,9 @@ AT_BOUND = "at the end of its search range"
 #: Note of an interval whose profile was not followed.
 BY_CURVATURE = "from the curvature at the optimum: the profile was not followed to its end"
 
-_DETERMINED_RATIO = 5.0  # ratio of the ends of an interval, above which a value is not quoted
+#: Moves of an optimum to better points that profiles come to; what gains goes on.
+MOVES_MAX = 3
+
 _J_WORDS = "no spring stiffens measurably at these stretches: only a lower bound"
 _AT_END = 1e-9  # of a coordinate: a descent clips to the bound itself
 
@@ -69,76 +80,134 @@ def _never() -> bool:
     return False
 
 
+@dataclass(frozen=True)
+class Intervals:
+    """Estimates with 95 % intervals, and ``sums`` of moduli of which the parts are not determined.
+
+    ``covariance`` (f, f), in SI units, is that of the parameters ``names``, which were fitted.
+    """
+
+    estimates: tuple[Estimate, ...]
+    names: tuple[str, ...]
+    covariance: np.ndarray
+    sums: tuple[Estimate, ...] = ()
+
+
 def estimates_with_intervals(
     problem: Problem,
     values: np.ndarray,
     held: np.ndarray,
     report: Callable[[float], None],
     lower_ends: bool = True,
-    which: np.ndarray | None = None,
     ended: Callable[[], bool] = _never,
-) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
-    """Return estimates at ``values`` (d,) with 95 % intervals, and names and covariance (f, f).
+    gain: float | None = math.inf,
+    finer: tuple[Problem, np.ndarray] | None = None,
+) -> Intervals:
+    """Return estimates at the optimum ``values`` (d,) of ``problem`` with 95 % intervals.
 
     ``held`` (d,) bool are parameters that were not fitted; with ``lower_ends`` each locking limit
-    among them is freed alone for its own lower end. ``problem`` has its optimum near ``values``.
-    Only the parameters ``which`` (d,) bool get an estimate, where it is given.
-    ``report`` receives the fraction that is done, at each point of a profile. Once ``ended()`` is
-    True no profile is followed any further: the intervals that are left come from the curvature at
-    the optimum, and their notes say so. The covariance, in SI units, is that of the parameters that
-    were fitted.
+    among them is freed alone for its own lower end. ``finer`` is a problem with the same optimum
+    and which parameters (d,) bool are profiled on it. ``report`` receives the fraction that is
+    done, at each point of a profile. Once ``ended()`` is True no profile is followed any further:
+    the intervals that are left come from the curvature at the optimum, and their notes say so.
+    Raises ``BetterPoint`` where chi-square falls by more than ``gain`` anywhere that a profile
+    comes to; None is what ends a descent.
     """
     layout = problem.layout
-    centre = descend(problem, layout.coordinates(values), held, iterations=10)
-    free = ~held
-    inflation = max(1.0, centre.cost) * max(1.0, correlation_time(centre.residuals))
-    jac = problem.jacobian(centre.x, free)
-    cov = covariance(jac.T @ jac, inflation)
-    chi2 = centre.cost * problem.samples
-    ends = at_bound(layout, layout.coordinates(values))
+    best, cov, jac = _about(problem, values, held, gain)
+    ends = at_bound(layout, best.x)
+    bent = np.zeros(layout.size, dtype=bool) if finer is None else finer[1]
+    # other valleys count as one more
+    shares = layout.size + 1
     estimates = []
-    wanted = [j for j in range(layout.size) if which is None or which[j]]
-    for place, j in enumerate(wanted):
+    for place in (*np.flatnonzero(~bent), *np.flatnonzero(bent)):
+        j = int(place)
         q, value = layout.quantities[j], float(values[j])
         if held[j] and not (lower_ends and q.kind == "J"):
             estimates.append(Estimate(q.name, q.unit, value, 0.0, math.inf, False, "held"))
             continue
-        points = count(1)
-
-        def tick(before: int = place, points: Iterator[int] = points) -> None:
-            # how many points a profile takes is not known: four are the rule
-            part = 1.0 - 0.5 ** (next(points) / 2.0)
-            report((before + part) / len(wanted))
-            if ended():
-                raise _Ended
-
+        on = replace(best, problem=finer[0]) if finer is not None and bent[j] else best
         sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already at its upper end
+        tick = _ticks(report, ended, len(estimates), shares)
         try:
-            low, high = profile(problem, centre.x, chi2, j, jac, inflation, held, tick, sides)
+            low, high = on.profile(j, jac, tick, sides)
             followed = True
         except _Ended:
-            low, high = _by_curvature(centre.x, cov, free, j)
+            low, high = _by_curvature(best.x, cov, ~held, j)
             followed = False
-        if q.logarithmic:
-            low, high = math.exp(low), math.exp(high)
-        # an open end of a spring's parameter is 0 or infinite, of an effect's the end of its range
-        lowest, highest = q.bounds if q.kind == "effect" else (0.0, math.inf)
-        low, high = max(low, lowest), min(high, highest)
-        low, high = float(min(low, value)), float(max(high, value))
-        determined = is_determined(low, high) and not ends[j]
-        note = "" if determined else _open_text(low, high)
-        if held[j]:
-            note = _J_WORDS if low > 0.0 else "not determined by these data"
-        elif ends[j]:
-            note = AT_BOUND
-        elif not followed:
-            note = f"{note}; {BY_CURVATURE}" if note else BY_CURVATURE
+        low, high = natural_ends(q, low, high)
         estimates.append(
-            Estimate(q.name, q.unit, value, low, high, determined, note, at_bound=bool(ends[j]))
+            _estimate(q, value, (low, high), bool(held[j]), bool(ends[j]), followed=followed)
         )
-    names = tuple(n for n, f in zip(layout.names, free, strict=True) if f)
-    natural = np.where([q.logarithmic for q in layout.quantities], values, 1.0)[free]
-    return estimates, names, cov * np.outer(natural, natural)
+    estimates.sort(key=lambda e: layout.names.index(e.name))
+    sums: tuple[Estimate, ...] = ()
+    on = best if finer is None else replace(best, problem=finer[0])
+    valleys = None if ended() else valleys_of(on, estimates)
+    if valleys is not None:
+        tick = _ticks(report, ended, layout.size, shares)
+        estimates, sums = widened(valleys, estimates, tick, _Ended)
+    names = tuple(n for n, h in zip(layout.names, held, strict=True) if not h)
+    natural = np.where([q.logarithmic for q in layout.quantities], values, 1.0)[~held]
+    return Intervals(tuple(estimates), names, cov * np.outer(natural, natural), sums)
+
+
+def _about(
+    problem: Problem, values: np.ndarray, held: np.ndarray, gain: float | None
+) -> tuple[Optimum, np.ndarray, np.ndarray]:
+    """Return the optimum at ``values`` (d,), with the covariance (f, f) and Jacobian (N, f) there.
+
+    Raises ``BetterPoint`` where it is none.
+    """
+    layout = problem.layout
+    x = np.clip(layout.coordinates(values), layout.lower, layout.upper)
+    residuals = problem.residuals(x)
+    chi2 = float(residuals @ residuals)
+    enough = gain_that_counts(chi2, problem.samples) if gain is None else gain
+    if math.isfinite(enough):
+        fit = descend(problem, x, held, iterations=10, gain=enough)
+        gained = chi2 - fit.cost * problem.samples
+        if gained > enough:
+            raise BetterPoint(fit.x, gained)
+    inflation = max(1.0, chi2 / problem.samples) * max(1.0, correlation_time(residuals))
+    jac = problem.jacobian(x, ~held)
+    best = Optimum(problem, x, held, chi2, inflation, enough)
+    return best, covariance(jac.T @ jac, inflation), jac
+
+
+def _ticks(
+    report: Callable[[float], None], ended: Callable[[], bool], before: int, shares: int
+) -> Callable[[], None]:
+    """Return what is called at each point of a profile, after so many ``before`` of ``shares``."""
+    points = count(1)
+
+    def tick() -> None:
+        # how many points a profile takes is not known: four are the rule
+        report((before + 1.0 - 0.5 ** (next(points) / 2.0)) / shares)
+        if ended():
+            raise _Ended
+
+    return tick
+
+
+def _estimate(
+    q: FreeParameter,
+    value: float,
+    span: tuple[float, float],
+    held: bool,
+    at_end: bool,
+    followed: bool,
+) -> Estimate:
+    """Return the estimate of one parameter with the interval ``span``, and a note on it."""
+    low, high = span
+    determined = is_determined(low, high) and not at_end
+    note = "" if determined else _open_text(low, high)
+    if held:
+        note = _J_WORDS if low > 0.0 else "not determined by these data"
+    elif at_end:
+        note = AT_BOUND
+    elif not followed:
+        note = f"{note}; {BY_CURVATURE}" if note else BY_CURVATURE
+    return Estimate(q.name, q.unit, value, low, high, determined, note, at_bound=at_end)
 
 
 def _by_curvature(
@@ -156,12 +225,6 @@ def at_bound(layout: FitLayout, x: np.ndarray) -> np.ndarray:
     """Return which coordinates ``x`` (d,) are at an end of their search range, (d,) bool."""
     room = np.minimum(x - layout.lower, layout.upper - x)
     return np.asarray(room <= _AT_END * (1.0 + np.abs(x)))
-
-
-def is_determined(low: float, high: float) -> bool:
-    """Whether an interval is narrow enough for its value to be quoted, and excludes 0."""
-    near, far = sorted((abs(low), abs(high)))
-    return low * high > 0.0 and far < math.inf and far / near <= _DETERMINED_RATIO
 
 
 def _open_text(low: float, high: float) -> str:

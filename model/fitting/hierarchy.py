@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.model.errors import ModelError
-from dearig.model.fitting.estimates import at_bound, is_determined
+from dearig.model.fitting.estimates import at_bound
 from dearig.model.fitting.identify import coarse_problem, fit_globally
-from dearig.model.fitting.intervals import correlation_time
+from dearig.model.fitting.intervals import correlation_time, is_determined
 from dearig.model.fitting.levenberg import gain_that_counts
 from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, require_free
 from dearig.model.fitting.problem import Problem

@@ -14,6 +14,9 @@ from dearig.model.errors import ModelError
 from dearig.model.film.material import Network
 from dearig.model.fitting.estimates import (
     AT_BOUND,
+    MOVES_MAX,
+    BetterPoint,
+    Intervals,
     at_bound,
     estimates_with_intervals,
     recentre,
@@ -24,6 +27,7 @@ from dearig.model.fitting.parameters import Contribution, Estimate, FitLayout, r
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.rejection import misfit_p
 from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
+from dearig.model.fitting.spare import sums_text
 from dearig.model.fitting.thinning import thinned
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
 from dearig.model.simulation.actuator import Actuator
@@ -66,7 +70,8 @@ class Identification:
     """Result of a fit.
 
     ``model`` is the fitted actuator or strip, ``estimates`` its parameters with 95 % intervals,
-    ``covariance`` (f, f) that of ``covariance_names``, in SI units. ``cost`` is the mean square of
+    ``covariance`` (f, f) that of ``covariance_names``, in SI units. ``sums`` are estimates of sums
+    of moduli of which the data do not determine the parts. ``cost`` is the mean square of
     the residuals over the noise (1 when only noise is left); ``correlation`` the correlation
     time of the residuals in samples, by which the intervals are widened. ``held_limits`` names the
     locking limits that were held because the data do not determine them. ``warnings`` are sentences
@@ -87,6 +92,7 @@ class Identification:
     warnings: tuple[str, ...]
     held_limits: tuple[str, ...] = ()
     budget: tuple[Contribution, ...] = ()
+    sums: tuple[Estimate, ...] = ()
     misfit_p: float | None = None
 
     @property
@@ -141,17 +147,44 @@ def add_intervals(
     workers: int = 2,
     progress: Progress = _quiet,
 ) -> Identification:
-    """Return ``fitted`` with 95 % intervals; ``records`` are its training records."""
+    """Return ``fitted`` with 95 % intervals; ``records`` are its training records.
+
+    Where a profile comes to a better point, the fit moves there, and the intervals are about that.
+    """
     layout = FitLayout(fitted.model)
     problem = Problem(records, layout, workers)
     held = np.array([name in fitted.held_limits for name in layout.names])
-    estimates, names, cov = _intervals(problem, layout.initial(), held, progress)
+    simulations = fitted.simulations
+    found: Intervals | None = None
+    gain: float | None = None
+    for _ in range(MOVES_MAX):
+        try:
+            found = _intervals(problem, layout.initial(), held, progress, gain)
+        except BetterPoint as better:
+            fit = descend(problem, better.x, held, damping=1e-4)
+            if fit.cost < fitted.cost:
+                fitted = _result(
+                    problem, fitted.method, fit, layout.values(fit.x), "", fitted.held_limits
+                )
+                layout = problem.layout = FitLayout(fitted.model)
+            else:
+                # so much is an error of the means
+                gain = better.gained
+        else:
+            break
+    if found is None:
+        found = _intervals(problem, layout.initial(), held, progress, math.inf)
+    warnings = fitted.warnings
+    if found.sums:
+        warnings = (*warnings, sums_text(found.sums))
     return replace(
         fitted,
-        estimates=(*(e for e in fitted.estimates if not e.free), *estimates),
-        covariance_names=names,
-        covariance=cov,
-        simulations=fitted.simulations + problem.simulations,
+        estimates=(*(e for e in fitted.estimates if not e.free), *found.estimates),
+        sums=found.sums,
+        covariance_names=found.names,
+        covariance=found.covariance,
+        warnings=warnings,
+        simulations=simulations + problem.simulations,
     )
 
 
@@ -367,34 +400,30 @@ def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: in
 
 
 def _intervals(
-    problem: Problem, values: np.ndarray, held: np.ndarray, progress: Progress
-) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
+    problem: Problem,
+    values: np.ndarray,
+    held: np.ndarray,
+    progress: Progress,
+    gain: float | None,
+) -> Intervals:
     """Return estimates with profile-likelihood intervals; ``held`` (d,) limits are undetermined."""
-    layout = problem.layout
-    if not isinstance(layout.base, Actuator):
+    if not isinstance(problem.layout.base, Actuator):
         means = coarse_problem(problem)
         recentre(means, problem, values)
-        levels = [(means, np.ones(layout.size, dtype=bool))]
+        levels = [(means, np.ones(problem.layout.size, dtype=bool))]
     else:
         levels = _levels_of(problem, values, held)
-    names: tuple[str, ...] = ()
-    covariance = np.empty((0, 0))
-    found: dict[str, Estimate] = {}
-    count = sum(int(which.sum()) for _, which in levels)
-    for means, which in levels:
-        before = len(found)
-
-        def report(part: float, before: int = before, some: int = int(which.sum())) -> None:
-            progress("intervals", min((before + part * some) / count, 1.0))
-
-        estimates, names, covariance = estimates_with_intervals(
-            means, values, held, report, which=which
-        )
-        found |= {e.name: e for e in estimates}
-        if means is not problem:
-            problem.simulations += means.simulations
+    found = estimates_with_intervals(
+        levels[0][0],
+        values,
+        held,
+        lambda part: progress("intervals", min(part, 1.0)),
+        gain=gain,
+        finer=levels[1] if len(levels) > 1 else None,
+    )
+    problem.simulations += sum(means.simulations for means, _ in levels if means is not problem)
     progress("intervals", 1.0)
-    return [found[name] for name in layout.names], names, covariance
+    return found
 
 
 def _levels_of(

@@ -10,17 +10,20 @@ import numpy as np
 from scipy.special import kolmogorov
 
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import FitLayout
+from dearig.model.fitting.parameters import FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
 
 __all__ = [
     "CHI2_95",
+    "BetterPoint",
     "correlation_time",
     "covariance",
     "firm_directions",
     "has_spectrum_of",
+    "is_determined",
     "is_flat",
     "linear_widths",
+    "natural_ends",
     "profile",
     "spectrum_distance",
     "unevenness",
@@ -32,6 +35,7 @@ _NORMAL_95 = math.sqrt(CHI2_95)
 #: determine. Derivatives by differences are known to some 1e-5; a smaller eigenvalue is the square
 #: of their error.
 _TOLD = 1e-10
+_DETERMINED_RATIO = 5.0  # ratio of the ends of an interval, above which a value is not quoted
 _POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: tolerance of its crossing
 _NEAR_A_LIMIT = 0.3  # the same for an undetermined limit, which is bounded to decades only
@@ -110,6 +114,26 @@ def spectrum_distance(
     return away, 1.0 / (1.0 / lines[0] + 1.0 / lines[1])
 
 
+def natural_ends(q: FreeParameter, low: float, high: float) -> tuple[float, float]:
+    """Return the natural ends of an interval of the coordinate of ``q``.
+
+    An open end of a spring's parameter is 0 or infinite, of an effect's the end of its range. A
+    modulus at the lower end of its search range is 0.
+    """
+    if q.logarithmic:
+        low, high = math.exp(low), math.exp(high)
+    lowest, highest = q.bounds if q.kind == "effect" else (0.0, math.inf)
+    if q.kind == "mu" and low <= q.bounds[0]:
+        low = 0.0
+    return max(low, lowest), min(high, highest)
+
+
+def is_determined(low: float, high: float) -> bool:
+    """Whether an interval is narrow enough for its value to be quoted, and excludes 0."""
+    near, far = sorted((abs(low), abs(high)))
+    return low * high > 0.0 and far < math.inf and far / near <= _DETERMINED_RATIO
+
+
 def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:
     """Return the covariance (f, f) of the coordinates from J^T J, times ``inflation``.
 
@@ -168,6 +192,14 @@ def linear_widths(exact: np.ndarray, other: np.ndarray, directions: np.ndarray) 
         variances.append(np.einsum("ij,jk,ik->i", directions, inverse, directions))
     seen = variances[0] > 0.0
     return np.asarray(np.sqrt(variances[1][seen] / variances[0][seen]))
+
+
+class BetterPoint(Exception):  # noqa: N818  (it is no error)
+    """A point ``x`` (d,) whose chi-square is ``gained`` below that of the optimum of intervals."""
+
+    def __init__(self, x: np.ndarray, gained: float) -> None:
+        super().__init__("chi-square has a lower minimum")
+        self.x, self.gained = x, gained
 
 
 @dataclass(frozen=True)
@@ -240,6 +272,7 @@ def profile(
     held: np.ndarray,
     tick: Callable[[], None],
     sides: tuple[float, ...] = (-1.0, 1.0),
+    gain: float = math.inf,
 ) -> tuple[float, float]:
     """Return the 95 % interval of coordinate ``index`` by profile likelihood.
 
@@ -247,7 +280,8 @@ def profile(
     gives the step and the path of the others, ``inflation`` the factor by which chi-square
     counts less than its white-noise value, ``held`` (d,) bool the parameters that are not refitted.
     An end that the data do not determine, or that is not among ``sides``, is -inf or inf.
-    ``tick`` is called at each point.
+    ``tick`` is called at each point. Raises ``BetterPoint`` where chi-square is lower than at the
+    optimum by more than ``gain``.
     """
     layout = problem.layout
     fixed = held.copy()
@@ -278,17 +312,19 @@ def profile(
             at_bound = sign * (point - bound) >= 0.0
             step_before = abs(point - inside)
             # as much as moves the crossing by its tolerance: the quadratic model's word is taken
-            gain = 2.0 * near * threshold
+            little = 2.0 * near * threshold
             fit = descend(
                 problem,
                 guess,
                 fixed,
                 iterations=8,
-                gain=gain,
+                gain=little,
                 damping=1e-5,
                 patience=2,
                 quick=True,
             )
+            if chi2 - fit.cost * problem.samples > gain:
+                raise BetterPoint(fit.x, chi2 - fit.cost * problem.samples)
             excess = fit.cost * problem.samples - fit.to_gain - chi2
             z = math.sqrt(max(excess, 0.0) / threshold)
             if abs(z - 1.0) < near:

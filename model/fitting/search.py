@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb, inf
@@ -18,7 +18,7 @@ from dearig.model.film.network import HEAD
 from dearig.model.fitting.parameters import THESIS_RANGES, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.kinematics import electric_along
-from dearig.model.readings.records import ActuatorRecord, FilmRecord
+from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import unit_stresses
 from dearig.model.springs import SPRING_LAWS
@@ -29,6 +29,7 @@ __all__ = [
     "Algorithm1",
     "algorithm_1",
     "film_starts",
+    "resolved_times",
     "voltage_starts",
 ]
 
@@ -251,12 +252,20 @@ def film_starts(
     return _ranked(layout, found, starts)
 
 
+def resolved_times(records: Sequence[Record]) -> tuple[float, float]:
+    """Return the least and largest relaxation time in s that ``records`` resolve.
+
+    Two samples, and three durations.
+    """
+    shortest = min(float(np.median(np.diff(r.time))) for r in records)
+    longest = max(float(r.time[-1] - r.time[0]) for r in records)
+    return 2.0 * shortest, 3.0 * longest
+
+
 def _time_grid(problem: Problem, points: int = 16) -> np.ndarray:
-    """Return relaxation times that records resolve, two samples to three durations, in bounds."""
+    """Return relaxation times that records resolve, in bounds."""
     layout = problem.layout
-    shortest = min(float(np.median(np.diff(r.time))) for r in problem.records)
-    longest = max(float(r.time[-1] - r.time[0]) for r in problem.records)
-    first, last = 2.0 * shortest, 3.0 * longest
+    first, last = resolved_times(problem.records)
     times = layout.column("T")
     if times.size:
         low, high = np.exp(layout.lower[times].min()), np.exp(layout.upper[times].max())

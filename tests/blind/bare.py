@@ -16,6 +16,7 @@ import numpy as np
 from dearig.cli.main import main
 from dearig.model.diagnosis import stages
 from dearig.model.fitting import Estimate
+from dearig.model.fitting.estimates import Intervals
 from dearig.model.fitting.problem import Problem
 
 
@@ -24,16 +25,14 @@ def values_alone(
     values: np.ndarray,
     held: np.ndarray,
     report: Callable[[float], None],
-    lower_ends: bool = True,
-    which: np.ndarray | None = None,
-    ended: Callable[[], bool] = lambda: False,
-) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
+    **_: object,
+) -> Intervals:
     """Return estimates at ``values`` (d,) with open intervals."""
     found = [
         Estimate(q.name, q.unit, float(v), 0.0, math.inf, False, "no interval was asked for")
         for q, v in zip(problem.layout.quantities, values, strict=True)
     ]
-    return found, (), np.empty((0, 0))
+    return Intervals(tuple(found), (), np.empty((0, 0)))
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ def estimate_table(stage: Stage, rejected: bool = False) -> Table:
     """Return all parameters of a model, which the data may have ``rejected``."""
     rows = [
         _estimate(e, symbol(e.name).replace("_", " "), e.note, bool(stage.budget))
-        for e in stage.estimates
+        for e in (*stage.estimates, *stage.sums)
     ]
     return _estimates("Parameters", rows, stage.estimates, stage.budget, rejected)
 

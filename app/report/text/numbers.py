@@ -142,7 +142,9 @@ def seconds(duration: float) -> str:
 
 
 def symbol(name: str) -> str:
-    """Return the symbol of a parameter: mu_0 becomes a Greek letter with a subscript."""
+    """Return the symbol of a parameter, or of a sum: mu_0 becomes a letter with a subscript."""
+    if " + " in name:
+        return " + ".join(map(symbol, name.split(" + ")))
     match = _NAMED.fullmatch(name)
     if match is None:
         return name

@@ -206,7 +206,7 @@ def parameter_table(fit: Identification) -> Table:
     published = table_3(fit.model)
     known = fit.covariance.size > 0
     rows = []
-    for e in fit.estimates:
+    for e in (*fit.estimates, *fit.sums):
         factor, unit = parameter_unit(e.unit)
         if known:
             # only the digits that all uncertainties support

@@ -8,9 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dearig.model.fitting.estimates import BY_CURVATURE, estimates_with_intervals, recentre
+from dearig.model.fitting import add_intervals, identify
+from dearig.model.fitting.estimates import (
+    BY_CURVATURE,
+    BetterPoint,
+    estimates_with_intervals,
+    recentre,
+)
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Estimate
+from dearig.model.fitting.parameters import Estimate, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.report.text.estimates import estimate_table
 from dearig.report.text.tables import parameter_table
@@ -26,9 +32,9 @@ def test_a_parameter_at_an_end_of_its_search_range_is_marked() -> None:
     problem, x, free = posed(lagged, replace(record, displacement=early))
     found = descend(problem, x, ~free)
     values = problem.layout.values(found.x)
-    estimates, _, _ = estimates_with_intervals(
+    estimates = estimates_with_intervals(
         problem, values, ~free, lambda _: None, lower_ends=False
-    )
+    ).estimates
     lag = estimates[-1]
     assert (lag.value, lag.at_bound, lag.determined) == (0.0, True, False)
     assert lag.note == "at the end of its search range"
@@ -67,9 +73,9 @@ def test_no_interval_is_narrower_than_with_all_others_known() -> None:
     twins = replace(PLAIN, network=replace(PLAIN.network, branches=(half, half, *rest)))
     problem, x, free = posed(twins, record_of(PLAIN, thesis_drive(rate=100.0)))
     found = descend(problem, x, ~free)
-    estimates, _, _ = estimates_with_intervals(
+    estimates = estimates_with_intervals(
         problem, problem.layout.values(found.x), ~free, lambda _: None, lower_ends=False
-    )
+    ).estimates
     alone = 1.96 / np.linalg.norm(problem.jacobian(found.x, free), axis=0)
     fitted = [e for e, f in zip(estimates, free, strict=True) if f]
     quantities = [q for q, f in zip(problem.layout.quantities, free, strict=True) if f]
@@ -83,9 +89,10 @@ def test_profiles_end_when_they_are_asked_to() -> None:
     found = descend(problem, x, ~free)
     values = problem.layout.values(found.x)
     points: list[float] = []
-    estimates, names, cov = estimates_with_intervals(
+    intervals = estimates_with_intervals(
         problem, values, ~free, points.append, lower_ends=False, ended=lambda: len(points) > 2
     )
+    estimates, names, cov = intervals.estimates, intervals.names, intervals.covariance
     # one point more for each parameter, at which it is asked
     assert len(points) <= 3 + free.sum()
     fitted = [e for e, f in zip(estimates, free, strict=True) if f]
@@ -98,3 +105,43 @@ def test_profiles_end_when_they_are_asked_to() -> None:
             assert e.high / e.value == pytest.approx(math.exp(1.96 * error / e.value), rel=1e-2)
         else:
             assert e.high - e.value == pytest.approx(1.96 * error, rel=1e-2)
+
+
+def test_a_value_off_the_optimum_is_no_end_of_its_own_interval() -> None:
+    problem, x, free = posed(PLAIN, record_of(PLAIN, thesis_drive(rate=100.0)))
+    off = problem.layout.values(descend(problem, x, ~free).x)
+    off[problem.layout.names.index("mu_1")] *= 1.01
+    with pytest.raises(BetterPoint) as better:
+        estimates_with_intervals(problem, off, ~free, lambda _: None, lower_ends=False, gain=None)
+    assert better.value.gained > 100.0
+    found = descend(problem, better.value.x, ~free)
+    estimates = estimates_with_intervals(
+        problem, problem.layout.values(found.x), ~free, lambda _: None, lower_ends=False
+    ).estimates
+    for e, f in zip(estimates, free, strict=True):
+        assert not f or e.low < e.value < e.high, e
+
+
+@pytest.mark.parametrize("changed", ["mu_0", "T_1"])
+def test_intervals_take_the_model_to_its_optimum(changed: str) -> None:
+    record = record_of(PLAIN, thesis_drive(rate=100.0))
+    fit = identify([record], PLAIN)
+    branch = PLAIN.network.branches[0]
+    network = fit.model.network
+    if changed == "mu_0":
+        equilibrium = replace(network.equilibrium, modulus=1.02 * network.equilibrium.modulus)
+        network = replace(network, equilibrium=equilibrium)
+    else:
+        network = replace(
+            network, branches=(replace(branch, relaxation_time=1.05 * branch.relaxation_time),)
+        )
+    off = replace(fit, model=replace(fit.model, network=network), cost=10.0 * fit.cost)
+    moved = add_intervals([record], off)
+    assert moved.cost == pytest.approx(fit.cost, rel=1e-4)
+    assert moved.correlation == pytest.approx(fit.correlation, rel=1e-2)
+    values = dict(zip(FitLayout(moved.model).names, FitLayout(moved.model).initial(), strict=True))
+    for e, before in zip(moved.estimates, fit.estimates, strict=True):
+        assert e.value == pytest.approx(values[e.name], rel=1e-9)
+        if before.determined:
+            assert e.low < e.value < e.high
+            assert before.low < e.value < before.high

@@ -33,10 +33,10 @@ def test_intervals_on_means_are_those_of_all_readings() -> None:
     record = record_of(PLAIN, thesis_drive(rate=200.0))
     fitted = identify([record], PLAIN)
     problem, x, free = posed(fitted.model, record)
-    exact, _, _ = estimates_with_intervals(
+    exact = estimates_with_intervals(
         problem, problem.layout.values(x), ~free, lambda _: None, lower_ends=False
     )
-    whole = {e.name: e for e in exact if e.determined}
+    whole = {e.name: e for e in exact.estimates if e.determined}
     assert len(whole) == int(free.sum())
     for e in fitted.estimates:
         if (other := whole.get(e.name)) is not None:

@@ -1,0 +1,74 @@
+"""Branches that act as one: their sum has an interval that holds the truth, the parts have none."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+
+import pytest
+
+from dearig.model.film.material import Network
+from dearig.model.fitting import Estimate, Identification, identify
+from dearig.report.as_json import outcome_json
+from dearig.report.text.estimates import estimate_table
+from dearig.report.text.tables import parameter_table
+from tests.tools.diagnosis import stage
+from tests.tools.engine import PLAIN, record_of, thesis_drive
+from tests.tools.reports import fit as paper_fit
+from tests.tools.reports import identify_outcome
+
+#: Two branches at 0.462 and 0.470 s: a single one of 104.51 kPa leaves the same error.
+TWINS = replace(PLAIN, network=Network.gent((50e3, 46.84e3, 57.67e3), (1e4,) * 3, (0.462, 0.470)))
+APART = replace(PLAIN, network=Network.gent((50e3, 46.84e3, 57.67e3), (1e4,) * 3, (0.2, 2.0)))
+SEEDS = (0, 3)
+
+
+@functools.cache
+def fit_of_twins(seed: int) -> Identification:
+    base = replace(TWINS, network=Network.gent((50e3,) * 3, (1e4,) * 3, (0.3, 3.0)))
+    return identify([record_of(TWINS, thesis_drive(rate=100.0), seed=seed)], base)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_part_of_a_sum_has_an_interval_without_the_truth(seed: int) -> None:
+    truth = {"mu_0": 50e3, "mu_1": 46.84e3, "mu_2": 57.67e3, "T_1": 0.462, "T_2": 0.470}
+    for e in fit_of_twins(seed).estimates:
+        if e.name in truth:
+            assert e.low <= truth[e.name] <= e.high, e
+            assert e.low <= e.value <= e.high, e
+            assert e.determined == (e.name == "mu_0")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_sum_of_two_branches_that_act_as_one_is_determined(seed: int) -> None:
+    (total,) = fit_of_twins(seed).sums
+    assert total.name == "mu_1 + mu_2"
+    assert total.determined
+    assert total.low <= 46.84e3 + 57.67e3 <= total.high
+    assert total.low < total.value < total.high
+    assert math.isclose(total.value, 46.84e3 + 57.67e3, rel_tol=5e-3)
+    assert any(
+        "these data determine mu_1 + mu_2, not the parts" in w for w in fit_of_twins(seed).warnings
+    )
+
+
+def test_tables_and_json_have_the_sum() -> None:
+    total = Estimate("mu_1 + mu_2", "Pa", 104.5e3, 104.4e3, 104.6e3, True, "at about 0.466 s")
+    fit = paper_fit(sums=(total,))
+    rows = [
+        parameter_table(fit).rows[-1],
+        estimate_table(replace(stage(PLAIN, 1e-6), sums=(total,))).rows[-1],
+    ]
+    assert all("+" in row.cells[0] and row.detail == "at about 0.466 s" for row in rows)
+    # an estimate among the others would count as a free parameter
+    assert "mu_1 + mu_2" not in {e.name for e in fit.estimates}
+    outcome = identify_outcome()
+    (said,) = outcome_json(replace(outcome, fit=replace(outcome.fit, sums=(total,))))["sums"]
+    assert (said["name"], said["ci95"]) == ("mu_1 + mu_2", [104.4e3, 104.6e3])
+
+
+def test_branches_that_the_data_keep_apart_make_no_sum() -> None:
+    fit = identify([record_of(APART, thesis_drive(rate=100.0))], APART)
+    assert fit.sums == ()
+    assert {e.name for e in fit.estimates if e.determined} == {"mu_0", "mu_1", "mu_2", "T_1", "T_2"}
