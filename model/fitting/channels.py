@@ -167,10 +167,12 @@ class _Circuit:
         acting = int(active(mine))
         if not acting & loop.ELECTRIC_BITS:
             return self.plain
+        rows = self.plain + self._thinned(mine) - self._plain_thin
         if acting & AMPLIFIER and self._held:
             # a lag of the order of a sample: what a reading sees of each step of the output counts
-            return self.means(self._full(mine))
-        return self.plain + self._thinned(mine) - self._plain_thin
+            # (what the current sees of it is free: C_s)
+            rows[loop.OUTPUT] = self.means(self._full(mine)[loop.OUTPUT])
+        return rows
 
 
 class _Channel:
