@@ -23,14 +23,14 @@ _SETTLED = 1e-3  # of the range; an output nearer than this to its target counts
 @jit
 def _approach(
     start: float, target: float, tau: float, slew: float, elapsed: float
-) -> tuple[float, float, float]:
-    """Return output, slope and integral of the square, ``elapsed`` s after ``target`` was set."""
+) -> tuple[float, float]:
+    """Return the output and the integral of its square, ``elapsed`` s after ``target`` was set."""
     gap = target - start
     line = max(0.0, abs(gap) / slew - tau)  # the limit binds while |gap| > slew tau
     sign = 1.0 if gap > 0.0 else -1.0
     if elapsed < line:
         end = start + sign * slew * elapsed
-        return end, sign * slew, elapsed * (start * start + start * end + end * end) / 3.0
+        return end, elapsed * (start * start + start * end + end * end) / 3.0
     corner = start + sign * slew * line
     square = line * (start * start + start * corner + corner * corner) / 3.0
     rest = elapsed - line
@@ -39,7 +39,7 @@ def _approach(
     square += target * target * rest
     square -= 2.0 * target * gap * tau * (1.0 - left)
     square += 0.5 * gap * gap * tau * (1.0 - left * left)
-    return target - gap * left, gap * left / tau, square
+    return target - gap * left, square
 
 
 @jit
@@ -55,7 +55,7 @@ def _follow(
     """Follow ``target`` (N,); fill the output's start value and signed RMS in each interval."""
     for k in range(target.shape[0]):
         start[k] = output
-        output, _, square = _approach(output, target[k], tau, slew, interval)
+        output, square = _approach(output, target[k], tau, slew, interval)
         effective[k] = math.copysign(math.sqrt(max(square, 0.0) / interval), output)
     return output
 
@@ -68,10 +68,9 @@ def _outputs_at(
     slew: float,
     elapsed: float,
     output: np.ndarray,
-    slope: np.ndarray,
 ) -> None:
     for k in range(start.shape[0]):
-        output[k], slope[k], _ = _approach(start[k], target[k], tau, slew, elapsed)
+        output[k], _ = _approach(start[k], target[k], tau, slew, elapsed)
 
 
 @dataclass(frozen=True)
@@ -121,11 +120,9 @@ class Amplifier:
         settled = np.abs(target - ends) <= _SETTLED * self._range
         return AmplifierRows(start, target, effective, settled, slew), AmplifierState(output)
 
-    def outputs(
-        self, rows: AmplifierRows, intervals: slice, elapsed: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return output in V and slope in V/s, ``elapsed`` s into each of some ``intervals``."""
+    def outputs(self, rows: AmplifierRows, intervals: slice, elapsed: float) -> np.ndarray:
+        """Return the output in V, ``elapsed`` s into each of some ``intervals``."""
         start, target = rows.start[intervals], rows.target[intervals]
-        output, slope = np.empty_like(start), np.empty_like(start)
-        _outputs_at(start, target, self._tau, rows.slew, elapsed, output, slope)
-        return output, slope
+        output = np.empty_like(start)
+        _outputs_at(start, target, self._tau, rows.slew, elapsed, output)
+        return output

@@ -18,7 +18,7 @@ from dearig.model.simulation.actuator import (
     ends_of,
     initial_state,
 )
-from dearig.sim_backend.plant import Air, Motion
+from dearig.sim_backend.plant import Air, Electricity, Motion
 
 __all__ = ["ModelPlant"]
 
@@ -32,6 +32,7 @@ class ModelPlant:
     rest: float
     state: np.ndarray
     sensor: np.ndarray
+    charge: float = 0.0
     failed: bool = False
     air: Air | None = None
 
@@ -63,9 +64,15 @@ class ModelPlant:
         return ModelPlant.at_rest(self.actuator, air)
 
     def advance(
-        self, time: np.ndarray, voltage: np.ndarray, hold: bool
+        self,
+        time: np.ndarray,
+        voltage: np.ndarray,
+        hold: bool,
+        settled: np.ndarray | None = None,
     ) -> tuple[Motion, ModelPlant]:
         """Follow a voltage; see ``Plant.advance``. A failed film keeps its last position."""
+        held = voltage if settled is None else settled
+        ends = np.stack((held, ends_of(held, hold)))[:, :-1]
         stretch, rate = np.full(time.size, self.state[0]), np.zeros(time.size)
         fault, fault_at = None, 0
         after = self
@@ -83,18 +90,32 @@ class ModelPlant:
         displacement, velocity = (stretch - self.rest) * length, rate * length
         memory = self.sensor.copy()
         kernel.read_sensor(self.coefficients, time, displacement, velocity, memory)
-        after = replace(after, sensor=memory)
-        nothing = np.zeros(time.size)
+        electric = self._electricity(time, ends, stretch)
+        after = replace(after, sensor=memory, charge=float(electric.charge[1, -1]))
         motion = Motion(
             displacement=displacement,
             velocity=velocity,
-            capacitance=self.actuator.film.capacitance(stretch),
-            leakage=nothing,
-            heating=nothing,
+            electricity=electric,
+            heating=np.zeros(time.size),
             fault=fault,
             fault_at=fault_at,
         )
         return motion, after
+
+    def _electricity(self, time: np.ndarray, ends: np.ndarray, stretch: np.ndarray) -> Electricity:
+        """Return the electricity under ``ends`` (2, N - 1) V along ``stretch`` (N,)."""
+        capacitance = self.actuator.film.capacitance(stretch)
+        charge = np.stack((capacitance[:-1], capacitance[1:])) * ends
+        mean = (charge[1] - charge[0]) / np.diff(time)
+        return Electricity(
+            shown=ends,
+            output=ends,
+            voltage=ends,
+            charge=charge,
+            step=charge[0] - np.append(self.charge, charge[1, :-1]),
+            charging=np.stack((mean, mean)),
+            conduction=np.zeros_like(ends),
+        )
 
     def _air(self, time: np.ndarray) -> np.ndarray:
         """Return the air at ``time`` (N,) s above that of the start, as the kernel takes it."""

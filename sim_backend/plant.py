@@ -7,7 +7,32 @@ from typing import Protocol
 
 import numpy as np
 
-__all__ = ["Air", "Motion", "Plant"]
+__all__ = ["Air", "Electricity", "Motion", "Plant"]
+
+
+@dataclass(frozen=True)
+class Electricity:
+    """What the circuit of the film does in M intervals, in each of which the supply is held.
+
+    Arrays are (2, M) unless said otherwise. Their rows are the values at the start of an interval,
+    after the step of the supply, and at its end. ``shown`` V is the output as the amplifier's own
+    voltage monitor sees it, ``output`` V what the amplifier puts out, ``voltage`` V that at the
+    film, ``charge`` C on the film. ``charging`` A changes this charge between two steps,
+    ``conduction`` A is lost through the film.
+
+    ``step`` (M,) C is the charge that flows at once at the start of an interval; where a resistance
+    of the law is in series, it flows within ``lag`` s. The rest of the change of the charge is cut
+    off from the amplifier: a torn electrode takes it away.
+    """
+
+    shown: np.ndarray
+    output: np.ndarray
+    voltage: np.ndarray
+    charge: np.ndarray
+    step: np.ndarray
+    charging: np.ndarray
+    conduction: np.ndarray
+    lag: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -15,14 +40,13 @@ class Motion:
     """Motion of the film at N nodes in time, each array (N,).
 
     ``displacement`` m from the loaded rest state (longer is positive), ``velocity`` m/s,
-    ``capacitance`` F, ``leakage`` A through the film, ``heating`` K above the room. ``fault`` is
-    the reason why the motion stops at node ``fault_at``, or None without a fault.
+    ``heating`` K above the room, ``electricity`` in the N - 1 intervals between the nodes.
+    ``fault`` is the reason why the motion stops at node ``fault_at``, or None without a fault.
     """
 
     displacement: np.ndarray
     velocity: np.ndarray
-    capacitance: np.ndarray
-    leakage: np.ndarray
+    electricity: Electricity
     heating: np.ndarray
     fault: str | None = None
     fault_at: int = 0
@@ -60,9 +84,18 @@ class Plant(Protocol):
         """Return the film at rest in the ``air`` of its next run."""
         ...
 
-    def advance(self, time: np.ndarray, voltage: np.ndarray, hold: bool) -> tuple[Motion, Plant]:
+    def advance(
+        self,
+        time: np.ndarray,
+        voltage: np.ndarray,
+        hold: bool,
+        settled: np.ndarray | None = None,
+    ) -> tuple[Motion, Plant]:
         """Follow ``voltage`` (N,) V at ``time`` (N,) s; with ``hold`` each is held until the next.
 
         Node 0 is the present state: the last node of one call is the first of the next.
+        ``voltage`` has the mean Maxwell stress of the amplifier's output in an interval.
+        ``settled`` (N,) V is what this output settles at within it, by default ``voltage``; the
+        charge belongs to it.
         """
         ...

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from dearig.drivers.rig import Event
 from dearig.drivers.settings import RigSettings, ThermometerSettings
 from dearig.sim_backend.amplifier import Amplifier, AmplifierRows, AmplifierState
 from dearig.sim_backend.card import Converters
+from dearig.sim_backend.current import CurrentMonitor, CurrentState
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.laser import Laser, LaserRows, LaserState
 from dearig.sim_backend.laser_noise import WHITE
@@ -48,6 +49,7 @@ class PathState:
     plant: Plant
     amplifier: AmplifierState
     laser: LaserState
+    current: CurrentState = field(default_factory=CurrentState)
     settled: bool = True
     torn: tuple[float, float] | None = None
     stuck: int | None = None
@@ -83,6 +85,7 @@ class SignalPath:
         self._nodes = max(1, math.ceil(1.0 / (rate * _NODE_SPACING) - 1e-9))
         self._spacing = 1.0 / (rate * self._nodes)
         self._amplifier = Amplifier(settings.amplifier)
+        self._current = CurrentMonitor(settings.amplifier, self._spacing)
         self._laser = Laser(settings.laser, streams, run, 1.0 / rate, self._spacing, noise)
         self._names = settings.channel_names
         self._skews = {name: settings.skew(i) for i, name in enumerate(self._names[1:])}
@@ -103,11 +106,16 @@ class SignalPath:
         dead = self._active(first, samples, *_DEAD)
         rows, amplifier = self._amplify(command, dead, state)
         time = np.arange(first * nodes, (first + samples) * nodes + 1) * self._spacing
-        pulling = rows.effective
+        pulling, held = rows.effective, rows.target
         broken_lead = self._active(first, samples, FaultKind.ELECTRODE_OPEN)
         if broken_lead.any():
-            pulling = np.where(np.repeat(broken_lead, nodes), 0.0, pulling)
-        motion, plant = state.plant.advance(time, np.append(pulling, pulling[-1]), True)
+            pulling, held = (
+                np.where(np.repeat(broken_lead, nodes), 0.0, volts) for volts in (pulling, held)
+            )
+        motion, plant = state.plant.advance(
+            time, np.append(pulling, pulling[-1]), True, np.append(held, held[-1])
+        )
+        electricity = motion.electricity
         motion, torn = self._fall(motion, time, first, state.torn)
 
         monitors = self._settings.amplifier
@@ -116,7 +124,11 @@ class SignalPath:
         noise = noise[:, :samples] * (monitors.monitor_noise_mV * 1e-3)
 
         at, into = self._converted("voltage_monitor", samples)
-        voltage, _ = self._amplifier.outputs(rows, at, into)
+        voltage = self._amplifier.outputs(rows, at, into)
+        shown = electricity.shown[:, at]
+        part = into / self._spacing
+        beside = shown[0] * (1.0 - part) + shown[1] * part - held[at]
+        voltage += np.where(dead, 0.0, beside)
         voltage[self._active(first, samples, FaultKind.MONITOR_WIRE_OFF)] = 0.0
         counts = np.empty((len(self._names), samples), dtype=np.int16)
         counts[0] = command
@@ -124,8 +136,9 @@ class SignalPath:
             "voltage_monitor", voltage * 1e-3 * monitors.monitor_V_per_kV + noise[0]
         )
         at, into = self._converted("current_monitor", samples)
-        voltage, slope = self._amplifier.outputs(rows, at, into)
-        current = self._current(motion, at, voltage, slope)
+        current, delivered = self._current.read(
+            electricity, rows.slew, state.plant.capacitance, at, into, state.current
+        )
         current[dead | broken_lead] = 0.0
         shorted = self._active(first, samples, *_SHORTED)
         current[shorted] = self._into_short(command[shorted])
@@ -158,7 +171,7 @@ class SignalPath:
         if motion.fault is not None:
             events.append(Event(first + motion.fault_at // nodes, "fault", f"film: {motion.fault}"))
         events.sort(key=lambda event: event.sample)
-        after = PathState(plant, amplifier, laser, bool(rows.settled[-1]), torn, stuck)
+        after = PathState(plant, amplifier, laser, delivered, bool(rows.settled[-1]), torn, stuck)
         return counts, events, after
 
     def _active(self, first: int, samples: int, *kinds: FaultKind) -> np.ndarray:
@@ -168,7 +181,8 @@ class SignalPath:
         self, command: np.ndarray, dead: np.ndarray, state: PathState
     ) -> tuple[AmplifierRows, AmplifierState]:
         """Return the amplifier's output under ``command`` (n,) counts, 0 V where ``dead`` (n,)."""
-        nodes, capacitance = self._nodes, state.plant.capacitance
+        nodes = self._nodes
+        capacitance = state.plant.capacitance + self._settings.amplifier.cable_pF * 1e-12
         volts = np.repeat(self._card.put_out(command), nodes)
         edges = [0, *(np.flatnonzero(np.diff(dead)) + 1), command.size]
         now, pieces = state.amplifier, []
@@ -253,15 +267,6 @@ class SignalPath:
         skew = self._skews[channel]
         node = int(skew / self._spacing)
         return slice(node, samples * self._nodes, self._nodes), skew - node * self._spacing
-
-    def _current(
-        self, motion: Motion, at: slice, voltage: np.ndarray, slope: np.ndarray
-    ) -> np.ndarray:
-        """Return the current (n,) A into the film: d(C V)/dt, both changing, and the leakage."""
-        growth = np.diff(motion.capacitance)[at] / self._spacing
-        charging, leakage = motion.capacitance[:-1][at] * slope, motion.leakage[:-1][at]
-        current: np.ndarray = charging + growth * voltage + leakage
-        return current
 
     def _temperature(
         self, thermometer: ThermometerSettings, heating: np.ndarray, chunk: int

@@ -73,7 +73,8 @@ class Assessment:
 class RecordingSummary:
     """Summary of one file of a folder; ``trouble`` says why the file cannot be read.
 
-    ``name`` is its path in the folder without the ending. ``started`` is ISO time, ``duration`` in
+    ``name`` is its path in the folder without the ending. ``started`` is ISO time, with
+    ``start_is_import`` that of the import of a file that does not tell its own. ``duration`` is in
     s. ``texts`` are those of ``content.fields.TEXTS``. ``peaks`` has the largest absolute value of
     each channel, with its sign, in SI units. ``thumbnail`` are ``(time, signal)`` of a few points,
     scaled to 0 to 1. ``errors``, ``noise``, ``unfit`` and ``fitted`` are those of the
@@ -88,6 +89,7 @@ class RecordingSummary:
     texts: Mapping[str, str] = field(default_factory=dict)
     identifier: str = ""
     started: str = ""
+    start_is_import: bool = False
     duration: float = 0.0
     samples: int = 0
     complete: bool = True
@@ -180,6 +182,7 @@ def summary_of(folder: Path, entry: Entry) -> RecordingSummary:
         texts=entry.texts,
         identifier=entry.identifier,
         started=entry.start_time,
+        start_is_import=entry.start_is_import,
         duration=entry.duration_s or 0.0,
         samples=entry.samples,
         complete=entry.complete,

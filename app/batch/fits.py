@@ -31,6 +31,7 @@ from dearig.config.modelfile import load_model
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.content.fields import CONDITIONS, TEXTS
+from dearig.recording.content.provenance import is_start_known
 from dearig.recording.files import file_sha256, journal_of, one_line
 from dearig.recording.reading.reader import open_recording
 from dearig.recording.reading.recording import Recording
@@ -195,7 +196,8 @@ def about(recording: Recording) -> Row:
     noted = recording.provenance
     return {
         "sha256": recording.sha256,
-        "started": str(noted.get("start_time", "")),
+        # the moment of an import says nothing of the film's age
+        "started": str(noted.get("start_time", "")) if is_start_known(noted) else "",
         **{f.column: recording.texts.get(key, "") for key, f in TEXTS.items() if f.column},
         "title": recording.title,
         **{name: recording.conditions.get(name) for name in CONDITIONS},

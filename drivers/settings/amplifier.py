@@ -72,6 +72,20 @@ class AmplifierSettings(Section):
         le=1e4,
         description="small-signal bandwidth of the amplifier (-3 dB), modelled as first order",
     )
+    current_monitor_bandwidth_kHz: float = Field(
+        default=20.0,
+        ge=0.1,
+        le=1e4,
+        description="simulated rig only: bandwidth of the current monitor (-3 dB), modelled as "
+        "first order; amplifiers have some kHz to 20 kHz",
+    )
+    cable_pF: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1e6,
+        description="simulated rig only: capacitance of the cable to the film, whose charging the "
+        "current monitor shows too",
+    )
     monitor_noise_mV: float = Field(
         default=1.0, ge=0.0, le=100.0, description="simulated rig only: RMS noise of either monitor"
     )

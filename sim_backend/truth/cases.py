@@ -38,6 +38,7 @@ from dearig.sim_backend.truth.film import FilmNumbers
 from dearig.sim_backend.truth.generator_b import dielectric, electric, sensor
 from dearig.sim_backend.truth.generator_b import film as film_stress
 from dearig.sim_backend.truth.generator_b import load as load_forms
+from dearig.sim_backend.truth.monitored import with_monitor
 from dearig.sim_backend.truth.plant import TruthPlant
 
 __all__ = [
@@ -290,7 +291,7 @@ def draw(
     effects = []
     for family in _drawn_families(rng, kind, generator):
         form = forms[family][int(rng.integers(len(forms[family])))]
-        effects.append(form(rng, load))
+        effects.append(with_monitor(form(rng, load), seed))
     return TruthCase(seed, film, load, tuple(effects), network, generator, noise)
 
 

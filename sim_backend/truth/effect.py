@@ -10,18 +10,23 @@ import numpy as np
 from dearig.model.film.material import Load
 from dearig.sim_backend.plant import Air
 from dearig.sim_backend.truth.film import FilmNumbers
+from dearig.sim_backend.truth.supply import Supply
 
-__all__ = ["Course", "Draw", "Stage", "TruthEffect"]
+__all__ = ["Course", "Draw", "Stage", "SupplyStage", "TruthEffect"]
 
-#: One step of a signal path, with a state between calls: ``stage(time, rows, carry)`` returns the
-#: changed rows and the next ``carry``. ``carry`` is None in the first call of a run. It is never
-#: changed in place, because a run may continue from it again. Rows are copies. Node 0 of a call is
-#: the last node of the previous one. A voltage at the last node holds from there on only, so the
-#: next ``carry`` must not depend on it.
+#: One step of the sensor's path, with a state between calls: ``stage(time, rows, carry)`` returns
+#: the changed rows and the next ``carry``. ``carry`` is None in the first call of a run. It is
+#: never changed in place, because a run may continue from it again. Rows are copies. Node 0 of a
+#: call is the last node of the previous one.
 Stage = Callable[[np.ndarray, np.ndarray, object], tuple[np.ndarray, object]]
 
+#: One step from the amplifier to the film: ``stage(time, supply, carry)`` returns the changed
+#: supply, with ``carry`` as in ``Stage``. A voltage at the last node holds from there on only, so
+#: the next ``carry`` must not depend on it.
+SupplyStage = Callable[[np.ndarray, Supply, object], tuple[Supply, object]]
+
 #: A change that depends only on the time since the run's start: ``course(time, rows)`` returns the
-#: changed rows (4, N), which start as ``film.NO_COURSE``. Rows are copies.
+#: changed rows (5, N), which start as ``film.NO_COURSE``. Rows are copies.
 Course = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -34,9 +39,10 @@ class TruthEffect:
 
     * ``on_film``: changes the numbers of the equation of motion;
     * ``on_course``: changes the load, the Maxwell stress or the stiffness with time;
-    * ``on_voltage``: a stage on the voltage (N,) V at the film, held from node to node;
+    * ``on_voltage``: a stage of the supply of the film;
     * ``on_motion``: a stage on what the sensor sees, rows (2, N): displacement m, velocity m/s.
 
+    ``seen`` is True where the amplifier's voltage monitor shows what the effect does to its output.
     ``redrawn`` draws the effect for another run, where a part of it differs between runs;
     ``in_room`` gives it for a run in some air, where it follows from that.
     """
@@ -46,10 +52,11 @@ class TruthEffect:
     description: str
     on_film: Callable[[FilmNumbers], FilmNumbers] | None = None
     on_course: Course | None = None
-    on_voltage: Stage | None = None
+    on_voltage: SupplyStage | None = None
     on_motion: Stage | None = None
     redrawn: Callable[[np.random.Generator], TruthEffect] | None = None
     in_room: Callable[[Air], TruthEffect] | None = None
+    seen: bool = False
 
 
 #: Function that draws one form of an effect for a film under the load.

@@ -17,18 +17,19 @@ import numpy as np
 from dearig.model.compiled.jit import allocating, jit
 from dearig.model.film.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
 from dearig.sim_backend.truth import generator_b_laws
+from dearig.sim_backend.truth.circuit import behind_leak, permittivity
 from dearig.sim_backend.truth.generator_b_laws import (
     added_stress,
     electrode_charging,
     fastest_decay,
     healed,
-    permittivity_factor,
-    trap_leak,
     warming,
     wholeness,
 )
+from dearig.sim_backend.truth.hidden import Hidden
 
 __all__ = [
+    "COURSE_AREA",
     "COURSE_ELECTRIC",
     "COURSE_HEATING",
     "COURSE_PULL",
@@ -39,16 +40,16 @@ __all__ = [
     "FilmState",
     "Hidden",
     "follow",
-    "leakage",
     "rest_stretch",
 ]
 
 LOST = 1  #: status: the stretch diverged or a spring locked
 
-#: Rows of a course: factors on the load, on the Maxwell stress and on all moduli, and the room's
-#: warming in K (for a thermometer; its influence on the moduli is in their row).
-COURSE_PULL, COURSE_ELECTRIC, COURSE_STIFFNESS, COURSE_HEATING = range(4)
-NO_COURSE = (1.0, 1.0, 1.0, 0.0)
+#: Rows of a course: factors on the load, on the permittivity and on all moduli, the room's warming
+#: in K (for a thermometer; its influence on the moduli is in their row), and the part of the
+#: electrode that is still connected.
+COURSE_PULL, COURSE_ELECTRIC, COURSE_STIFFNESS, COURSE_HEATING, COURSE_AREA = range(5)
+NO_COURSE = (1.0, 1.0, 1.0, 0.0, 1.0)
 
 _STRETCH_MAX = 20.0
 _STABLE = 1.0  # maximum of step times fastest decay rate; the formula is stable up to 3.3
@@ -68,74 +69,6 @@ _STAGES = np.array(
 _WEIGHTS = np.array(
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0]
 )
-
-
-class Hidden(NamedTuple):
-    """Parameters of the effects within the equation of motion; the defaults have no influence.
-
-    The files of ``effects`` give formulas and sources. Lengths are given as stretches (of L1),
-    forces as nominal stresses.
-    """
-
-    # drag: (linear + quadratic |r| + power |r|^1/2) r for the rate r = lam'; Pa s, Pa s^2, Pa s^1.5
-    drag: float = 0.0
-    drag_quadratic: float = 0.0
-    drag_power: float = 0.0
-    # friction of bristles: Coulomb and static stress Pa, Stribeck rate 1/s and power (0: as a
-    # contact in oil eases), the bristles' reach, their damping Pa s, and the share of the reach
-    # within which they do not slip
-    friction: float = 0.0
-    friction_static: float = 0.0
-    friction_stribeck: float = 1.0
-    friction_easing: float = 2.0
-    friction_reach: float = 1.0
-    friction_damping: float = 0.0
-    friction_elastic: float = 0.0
-    # Bouc-Wen: saturated stress Pa, reach, exponent, share of what opens the loop
-    bouc: float = 0.0
-    bouc_reach: float = 1.0
-    bouc_exponent: float = 1.0
-    bouc_share: float = 0.5
-    # electrode: resistances of two sections in ohm (one if the second is 0), growth with stretch
-    ladder_1: float = 0.0
-    ladder_2: float = 0.0
-    ladder_gauge: float = 0.0
-    # leakage behind a series resistance in ohm: conductance S; exponent of Poole and Frenkel
-    # in V^-1/2 or, when above 0, of hopping in 1/V, the voltage of space charge, or that of
-    # tunnelling
-    leak_series: float = 0.0
-    leak_conductance: float = 0.0
-    leak_frenkel: float = 0.0
-    leak_hopping: float = 0.0
-    leak_space: float = 0.0
-    leak_tunnel: float = 0.0
-    # permittivity: share gained at large strain, reach; inverse square of a voltage
-    permittivity_strain: float = 0.0
-    permittivity_reach: float = 1.0
-    permittivity_field: float = 0.0
-    # softening: share lost to the largest stretch so far, reach, exponent; to the path, reach
-    damage: float = 0.0
-    damage_reach: float = 1.0
-    damage_exponent: float = 1.0
-    ageing: float = 0.0
-    ageing_reach: float = 1.0
-    # self-heating: K/s for each V^2, time constant s, share of the second body and its time
-    # constant s, relative change of moduli per K
-    heat: float = 0.0
-    heat_time: float = 1.0
-    heat_share: float = 0.0
-    heat_time_2: float = 1.0
-    heat_stiffness: float = 0.0
-    # end stop: travel beyond rest, Pa at a depth of 1, damping s
-    stop_travel: float = math.inf
-    stop_stiffness: float = 0.0
-    stop_damping: float = 0.0
-    # mass on a spring: kg/m as the film's inertia, angular frequency 1/s, damping ratio
-    second_inertia: float = 0.0
-    second_frequency: float = 0.0
-    second_damping: float = 0.0
-    # laws of generator B
-    further: generator_b_laws.Second = generator_b_laws.NOTHING
 
 
 _NOTHING = Hidden()
@@ -278,50 +211,6 @@ def _gent(modulus: float, limit: float, e: float) -> float:
 
 
 @jit
-def _leak(h: Hidden, v: float, lam: float) -> tuple[float, float]:
-    """Return the current in A through the film under ``v`` >= 0 V, and its slope in S."""
-    if h.leak_hopping > 0.0:
-        k = h.leak_hopping * lam
-        return h.leak_conductance / k * math.sinh(k * v), h.leak_conductance * math.cosh(k * v)
-    if h.leak_space > 0.0:
-        slope = h.leak_conductance * lam**4 / h.leak_space
-        return slope * v * v, 2.0 * slope * v
-    if h.further.trap_voltage > 0.0:
-        return trap_leak(h.further, h.leak_conductance, v, lam)
-    if h.leak_tunnel > 0.0:
-        if v <= 0.0:
-            return 0.0, 0.0
-        barrier = h.leak_tunnel / (v * lam)
-        current = h.leak_conductance * v * v / h.leak_tunnel * math.exp(-barrier)
-        return current, current * (2.0 + barrier) / v
-    root = h.leak_frenkel * math.sqrt(v * lam)
-    conductance = h.leak_conductance * math.exp(root)
-    return conductance * v, conductance * (1.0 + 0.5 * root)
-
-
-@jit
-def _behind_leak(h: Hidden, voltage: float, lam: float) -> float:
-    """Return the voltage at the film behind the series resistance, under ``voltage``."""
-    source = abs(voltage)
-    v = source
-    for _ in range(30):  # the current is convex: Newton's steps decrease without overshoot
-        current, slope = _leak(h, v, lam)
-        change = (v + h.leak_series * current - source) / (1.0 + h.leak_series * slope)
-        v = max(v - change, 0.0)
-        if abs(change) < 1e-9 * source:
-            break
-    return math.copysign(v, voltage)
-
-
-@jit
-def leakage(h: Hidden, voltage: np.ndarray, stretch: np.ndarray, current: np.ndarray) -> None:
-    """Fill ``current`` (N,) A through the film under source ``voltage`` (N,) V."""
-    for k in range(voltage.shape[0]):
-        v = _behind_leak(h, voltage[k], stretch[k])
-        current[k] = math.copysign(_leak(h, abs(v), stretch[k])[0], v)
-
-
-@jit
 def _slipped(start: float, reach: float, moved: float) -> float:
     """Return the strain of an element that slips beyond ``reach``."""
     return min(max(start + moved, -reach), reach)
@@ -371,7 +260,7 @@ def _derivative(
 
     v = voltage
     if h.leak_conductance > 0.0:
-        v = _behind_leak(h, voltage, lam)
+        v = behind_leak(h, voltage, lam)
     square = v * v
     if h.heat > 0.0:
         exchange = (y[_WARM_1] - y[_WARM_2]) / h.heat_time
@@ -402,13 +291,7 @@ def _derivative(
             into = current / (body.capacitance * lam * lam)
             dy[_SECTION_1] = into - 2.0 * rate / lam * y[_SECTION_1]
             square = y[_SECTION_1] * y[_SECTION_1]
-    electric *= body.electric
-    if has_second:
-        electric *= permittivity_factor(h.further, square, lam, body.rest)
-    if h.permittivity_strain != 0.0:
-        u = away / h.permittivity_reach
-        electric *= 1.0 + h.permittivity_strain * u / math.sqrt(1.0 + u * u)
-    electric /= 1.0 + h.permittivity_field * square * lam * lam
+    electric *= body.electric * permittivity(h, square, lam, body.rest)
 
     stress = pull * body.pull + electric * square * lam
     speed = abs(rate)
@@ -501,8 +384,9 @@ def follow(
 ) -> tuple[int, int]:
     """Integrate ``y`` and ``memory`` in place under ``voltage`` (N,) V at ``time`` (N,) s.
 
-    ``courses`` (4, N) hold from node to node. Fills ``rows`` (3, N): stretch, its rate in 1/s, the
-    film's warming in K. Returns ``(status, reached)``: 0, or ``LOST`` with the node from which the
+    ``courses`` (3, N) hold from node to node: factors on load, Maxwell stress and moduli. Fills
+    ``rows`` (5, N): stretch, its rate in 1/s, the film's warming in K, the voltages in V of the
+    electrode's sections. Returns ``(status, reached)``: 0, or ``LOST`` with the node from which the
     rows repeat the last valid stretch.
     """
     n = y.shape[0]
@@ -512,6 +396,7 @@ def follow(
     damped = _fastest(body, h, 1.0) > 0.0
     for k in range(nodes):
         rows[0, k], rows[1, k], rows[2, k] = y[0], y[1], y[_WARM_1]
+        rows[3, k], rows[4, k] = y[_SECTION_1], y[_SECTION_2]
         if k == nodes - 1:
             break
         interval = time[k + 1] - time[k]
@@ -571,7 +456,8 @@ def follow(
             elapsed += h_step
         if not _intact(springs, y):
             for late in range(k + 1, nodes):
-                rows[0, late], rows[1, late], rows[2, late] = rows[0, k], 0.0, rows[2, k]
+                for i in range(rows.shape[0]):
+                    rows[i, late] = rows[i, k] if i != 1 else 0.0
             return LOST, k + 1
     return 0, nodes
 

@@ -21,20 +21,27 @@ __all__ = [
 ]
 
 
+_AT_ONCE = 0.1  # of an interval; what relaxes faster has done so at its start
+
+
 @jit
 def polarise(
     time: np.ndarray,
     voltage: np.ndarray,
+    ends: np.ndarray,
     shares: np.ndarray,
     times: np.ndarray,
     slow: np.ndarray,
     effective: np.ndarray,
+    bound: np.ndarray,
+    creep: np.ndarray,
 ) -> None:
     """Return the voltage (N,) V, held between nodes, whose square is voltage times polarisation.
 
     ``slow`` (m,) V are the relaxing parts, updated in place up to the last node. They have
     ``shares`` (m,) of the polarisation and relaxation ``times`` (m,) s. Each is averaged over its
-    interval.
+    interval. Fills ``bound`` (2, N) V, the polarisation at both ends of each interval, at which the
+    voltage is ``ends`` (2, N) V, and ``creep`` (2, N) V/s, its rate there.
     """
     nodes = time.shape[0]
     share = 0.0
@@ -45,33 +52,52 @@ def polarise(
         polarisation = (1.0 - share) * v
         last = k == nodes - 1
         interval = 0.0 if last else time[k + 1] - time[k]
+        rise = 0.0 if last else (1.0 - share) * (ends[1, k] - ends[0, k]) / interval
+        for end in range(2):
+            bound[end, k] = (1.0 - share) * ends[end, k]
+            creep[end, k] = rise
         for i in range(shares.shape[0]):
             gap = slow[i] - v
+            before = slow[i]
             if last:
                 polarisation += shares[i] * slow[i]
             else:
                 left = -math.expm1(-interval / times[i])
                 polarisation += shares[i] * (v + gap * left * times[i] / interval)
                 slow[i] = v + gap * (1.0 - left)
+            if times[i] < _AT_ONCE * interval:
+                bound[0, k] += shares[i] * slow[i]
+            else:
+                bound[0, k] += shares[i] * before
+                creep[0, k] += shares[i] * (v - before) / times[i]
+                creep[1, k] += shares[i] * (v - slow[i]) / times[i]
+            bound[1, k] += shares[i] * slow[i]
         effective[k] = math.copysign(math.sqrt(max(v * polarisation, 0.0)), v)
 
 
 @jit
 def limit_slew(
-    time: np.ndarray, voltage: np.ndarray, slew: float, output: float, effective: np.ndarray
+    time: np.ndarray,
+    voltage: np.ndarray,
+    slew: float,
+    output: float,
+    effective: np.ndarray,
+    starts: np.ndarray,
 ) -> float:
     """Follow ``voltage`` (N,) V at ``slew`` V/s at most from ``output``; returns the new output.
 
-    Fills ``effective`` (N,) V with the root mean square of the straight line in each interval.
+    Fills ``starts`` (N,) V with the output at each node, and ``effective`` (N,) V with the root
+    mean square of the straight line in each interval.
     """
     nodes = time.shape[0]
     for k in range(nodes - 1):
+        starts[k] = output
         reach = slew * (time[k + 1] - time[k])
         end = min(max(voltage[k], output - reach), output + reach)
         square = (output * output + output * end + end * end) / 3.0
         effective[k] = math.copysign(math.sqrt(square), output + end)
         output = end
-    effective[nodes - 1] = output
+    effective[nodes - 1] = starts[nodes - 1] = output
     return output
 
 
@@ -83,11 +109,12 @@ def lag_voltage(
     damping: float,
     state: np.ndarray,
     effective: np.ndarray,
+    starts: np.ndarray,
 ) -> None:
     """Follow ``voltage`` (N,) V, held, by y'' + 2 d w y' + w^2 (y - v) = 0 with d below 1.
 
-    ``state`` (2,) is y V and y' V/s, updated in place. Fills ``effective`` (N,) V with the mean of
-    y at both ends of each interval.
+    ``state`` (2,) is y V and y' V/s, updated in place. Fills ``starts`` (N,) V with y at each node,
+    and ``effective`` (N,) V with the mean of y at both ends of each interval.
     """
     nodes = time.shape[0]
     sigma = damping * frequency
@@ -98,10 +125,11 @@ def lag_voltage(
         decay, c, s = math.exp(-sigma * h), math.cos(omega * h), math.sin(omega * h)
         b = (slope + sigma * gap) / omega
         end = voltage[k] + decay * (gap * c + b * s)
+        starts[k] = state[0]
         effective[k] = 0.5 * (state[0] + end)
         state[1] = decay * ((b * omega - sigma * gap) * c - (gap * omega + sigma * b) * s)
         state[0] = end
-    effective[nodes - 1] = state[0]
+    effective[nodes - 1] = starts[nodes - 1] = state[0]
 
 
 @jit
@@ -219,15 +247,18 @@ def follow_pair(
     delay: float,
     output: float,
     effective: np.ndarray,
+    starts: np.ndarray,
 ) -> float:
     """Follow ``voltage`` (N,) V, held, by y' = S tanh((v - y)/(S tau)); returns the new output.
 
-    In closed form sinh((v - y)/(S tau)) falls as exp(-t/tau). Fills ``effective`` (N,) V with the
-    root of the mean square by Simpson's rule.
+    In closed form sinh((v - y)/(S tau)) falls as exp(-t/tau). Fills ``starts`` (N,) V with the
+    output at each node, and ``effective`` (N,) V with the root of the mean square by Simpson's
+    rule.
     """
     nodes = time.shape[0]
     scale = slew * delay
     for k in range(nodes - 1):
+        starts[k] = output
         h = time[k + 1] - time[k]
         v = voltage[k]
         start = math.sinh((v - output) / scale)
@@ -236,7 +267,7 @@ def follow_pair(
         square = (output * output + 4.0 * middle * middle + end * end) / 6.0
         effective[k] = math.copysign(math.sqrt(square), output + end)
         output = end
-    effective[nodes - 1] = output
+    effective[nodes - 1] = starts[nodes - 1] = output
     return output
 
 

@@ -7,18 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dearig.sim_backend.plant import Air, Motion
-from dearig.sim_backend.truth.effect import Course, Stage, TruthEffect
+from dearig.sim_backend.plant import Air, Electricity, Motion
+from dearig.sim_backend.truth.circuit import electricity
+from dearig.sim_backend.truth.effect import Course, Stage, SupplyStage, TruthEffect
 from dearig.sim_backend.truth.film import (
+    COURSE_AREA,
     COURSE_ELECTRIC,
     COURSE_HEATING,
     NO_COURSE,
     FilmNumbers,
     FilmState,
     follow,
-    leakage,
     rest_stretch,
 )
+from dearig.sim_backend.truth.supply import Supply
 
 __all__ = ["TruthPlant"]
 
@@ -27,7 +29,8 @@ __all__ = ["TruthPlant"]
 class TruthPlant:
     """Film of ``numbers`` with its present state and the stages before and after it.
 
-    ``plain`` are the numbers without the changes of ``effects``.
+    ``plain`` are the numbers without the changes of ``effects``. ``carries`` are the states of the
+    stages, ``circuit`` is that of ``circuit.electricity``.
     """
 
     plain: FilmNumbers
@@ -36,9 +39,10 @@ class TruthPlant:
     rest: float
     state: FilmState
     on_course: tuple[Course, ...]
-    on_voltage: tuple[Stage, ...]
+    on_voltage: tuple[tuple[TruthEffect, SupplyStage], ...]
     on_motion: tuple[Stage, ...]
     carries: tuple[object, ...]
+    circuit: tuple[float, float] = (0.0, 0.0)
     failed: bool = False
 
     @classmethod
@@ -53,7 +57,7 @@ class TruthPlant:
                 numbers = effect.on_film(numbers)
         rest = rest_stretch(numbers)
         on_course = tuple(e.on_course for e in effects if e.on_course is not None)
-        on_voltage = tuple(e.on_voltage for e in effects if e.on_voltage is not None)
+        on_voltage = tuple((e, e.on_voltage) for e in effects if e.on_voltage is not None)
         on_motion = tuple(e.on_motion for e in effects if e.on_motion is not None)
         carries = (None,) * (len(on_voltage) + len(on_motion))
         state = numbers.at_rest(rest)
@@ -79,32 +83,36 @@ class TruthPlant:
         return self.numbers.capacitance * float(self.state.y[0]) ** 2
 
     def advance(
-        self, time: np.ndarray, voltage: np.ndarray, hold: bool
+        self,
+        time: np.ndarray,
+        voltage: np.ndarray,
+        hold: bool,
+        settled: np.ndarray | None = None,
     ) -> tuple[Motion, TruthPlant]:
         """Follow a voltage; see ``Plant.advance``. A failed film keeps its last position."""
         carries = list(self.carries)
-        voltage = voltage.copy()
-        for i, stage in enumerate(self.on_voltage):
-            voltage, carries[i] = stage(time, voltage, carries[i])
+        supply, output, shown = self._supplied(time, voltage, hold, settled, carries)
         courses = np.repeat(np.array(NO_COURSE)[:, None], time.size, axis=1)
         for course in self.on_course:
             courses = course(time, courses)
+        acting = courses[:3].copy()
+        acting[COURSE_ELECTRIC] *= courses[COURSE_AREA]
 
-        numbers, hidden = self.numbers, self.numbers.hidden
+        numbers = self.numbers
         y, memory = self.state.y.copy(), self.state.memory.copy()
-        rows = np.zeros((3, time.size))
+        rows = np.zeros((5, time.size))
         rows[0] = y[0]
         fault, fault_at = None, 0
         if not self.failed:
             lost, reached = follow(
                 numbers.body(self.rest),
-                hidden,
+                numbers.hidden,
                 numbers.springs(),
                 numbers.slipping(),
                 numbers.step,
                 time,
-                voltage,
-                courses,
+                supply.pull,
+                acting,
                 hold,
                 y,
                 memory,
@@ -113,18 +121,15 @@ class TruthPlant:
             if lost:
                 fault, fault_at = "the stretch diverged or a spring locked", int(reached)
                 y = np.concatenate((rows[0, -1:], np.zeros(y.size - 1)))
-        stretch, rate, warming = rows
-        current = np.zeros(time.size)
-        if hidden.leak_conductance > 0.0:
-            leakage(hidden, voltage, stretch, current)
+        stretch, rate, warming = rows[:3]
         seen = np.stack((stretch - self.rest, rate)) * numbers.length
         for i, stage in enumerate(self.on_motion, start=len(self.on_voltage)):
             seen, carries[i] = stage(time, seen, carries[i])
+        electric, circuit = self._electricity(time, rows, supply, courses, output, shown)
         motion = Motion(
             displacement=seen[0],
             velocity=seen[1],
-            capacitance=numbers.capacitance * courses[COURSE_ELECTRIC] * stretch**2,
-            leakage=current,
+            electricity=electric,
             heating=warming + courses[COURSE_HEATING],
             fault=fault,
             fault_at=fault_at,
@@ -133,6 +138,71 @@ class TruthPlant:
             self,
             state=FilmState(y, memory),
             carries=tuple(carries),
+            circuit=circuit,
             failed=self.failed or fault is not None,
         )
         return motion, after
+
+    def _supplied(
+        self,
+        time: np.ndarray,
+        voltage: np.ndarray,
+        hold: bool,
+        settled: np.ndarray | None,
+        carries: list[object],
+    ) -> tuple[Supply, np.ndarray, np.ndarray]:
+        """Return the supply of the film, and the output and what the monitor shows (2, N - 1) V.
+
+        ``carries`` are replaced by those after the call.
+        """
+        held = (voltage if settled is None else settled).copy()
+        last = held if hold else np.append(held[1:], held[-1:])
+        supply = Supply(voltage.copy(), held, last)
+        output = shown = np.stack((held[:-1], last[:-1]))
+        for i, (effect, stage) in enumerate(self.on_voltage):
+            supply, carries[i] = stage(time, supply, carries[i])
+            if effect.acts_on == "amplifier":
+                output = np.stack((supply.first[:-1], supply.last[:-1]))
+                shown = output if effect.seen else shown
+        return supply, output, shown
+
+    def _electricity(
+        self,
+        time: np.ndarray,
+        rows: np.ndarray,
+        supply: Supply,
+        courses: np.ndarray,
+        output: np.ndarray,
+        shown: np.ndarray,
+    ) -> tuple[Electricity, tuple[float, float]]:
+        """Return the electricity along the motion ``rows`` (5, N), and the state after it."""
+        hidden, capacitance = self.numbers.hidden, self.numbers.capacitance
+        elapsed = np.append(np.diff(time), 1.0)  # nothing is asked of what follows the last node
+        ends, state = np.empty((4, 2, time.size - 1)), np.array(self.circuit)
+        step = np.empty(time.size - 1)
+        feeding = np.empty((6, time.size))
+        feeding[0], feeding[1] = supply.first, supply.last
+        feeding[2:4] = feeding[:2] if supply.bound is None else supply.bound
+        feeding[4:] = (
+            supply.creep if supply.creep is not None else (feeding[1] - feeding[0]) / elapsed
+        )
+        joined = np.ones(time.size, bool) if supply.joined is None else supply.joined
+        electricity(
+            hidden,
+            capacitance,
+            self.rest,
+            time,
+            rows,
+            feeding,
+            joined,
+            courses[COURSE_ELECTRIC],
+            courses[COURSE_AREA],
+            state,
+            ends,
+            step,
+        )
+        leaks = hidden.leak_conductance > 0.0
+        lag = hidden.leak_series * capacitance * self.rest**2 if leaks else 0.0
+        voltage, charge, charging, conduction = ends
+        electric = Electricity(shown, output, voltage, charge, step, charging, conduction, lag)
+        return electric, (float(state[0]), float(state[1]))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
 from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effect import TruthEffect
+from dearig.sim_backend.truth.supply import Supply
 
 __all__ = ["looking_back", "relaxing", "tones"]
 
@@ -19,13 +21,13 @@ OnMotion = Callable[[np.ndarray, np.ndarray, object], tuple[np.ndarray, object]]
 def relaxing(shares: np.ndarray, times: np.ndarray, words: str) -> TruthEffect:
     """Return a polarisation: ``shares`` (K,) of the permittivity relax in ``times`` (K,) s."""
 
-    def on_voltage(
-        time: np.ndarray, voltage: np.ndarray, carry: object
-    ) -> tuple[np.ndarray, object]:
+    def on_voltage(time: np.ndarray, supply: Supply, carry: object) -> tuple[Supply, object]:
         slow = np.zeros(times.size) if carry is None else np.array(carry)
-        effective = np.empty_like(voltage)
-        loops.polarise(time, voltage, shares, times, slow, effective)
-        return effective, slow
+        effective = np.empty_like(supply.pull)
+        bound, creep = np.empty((2, time.size)), np.empty((2, time.size))
+        ends = np.stack((supply.first, supply.last))
+        loops.polarise(time, supply.pull, ends, shares, times, slow, effective, bound, creep)
+        return replace(supply, pull=effective, bound=bound, creep=creep), slow
 
     return TruthEffect(
         family="dielectric_relaxation",

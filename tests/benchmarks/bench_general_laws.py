@@ -19,6 +19,7 @@ from dearig.sim_backend.truth import generator_b_laws
 from dearig.sim_backend.truth.cases import SECOND_FORMS
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers
+from dearig.sim_backend.truth.supply import Supply
 from tests.tools.effect_cases import numbers
 from tests.tools.general_laws import approximate, motion, response
 
@@ -56,7 +57,8 @@ def of_generator_b(effect: TruthEffect) -> np.ndarray | None:
     """What an effect of generator B adds along the motion (N,); None if no hook is like it."""
     path = motion()
     if effect.on_voltage is not None:
-        out, _ = effect.on_voltage(path.time, path.voltage.copy(), None)
+        supply = Supply(path.voltage, path.voltage, path.voltage)
+        out = effect.on_voltage(path.time, supply, None)[0].pull
         is_slow = effect.family == "dielectric_relaxation"
         changed: np.ndarray = out**2 - path.voltage**2 if is_slow else out - path.voltage
         return changed

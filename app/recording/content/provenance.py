@@ -16,7 +16,10 @@ from dearig.revision import revision, version
 
 __all__ = [
     "CONTINUES",
+    "FROM_IMPORT",
+    "START_FROM",
     "gather",
+    "is_start_known",
     "read_provenance",
     "write_provenance",
 ]
@@ -24,6 +27,10 @@ __all__ = [
 #: Name of the text with the path of the recording that a recording continues. It has no lead-in:
 #: its displacement is counted from that of the other.
 CONTINUES = "continues"
+
+#: Name of the text that says what tells the start of imported data; without it, and for
+#: ``FROM_IMPORT``, the start of the recording is the moment of the import.
+START_FROM, FROM_IMPORT = "start_time_from", "the import"
 
 #: Characters; longer texts are datasets, because an HDF5 attribute holds 64 KB at most.
 LONGEST_ATTRIBUTE = 1000
@@ -48,6 +55,11 @@ def gather(started: float, metadata: RunMetadata) -> dict[str, object]:
     if metadata.seed is not None:
         found["seed"] = metadata.seed
     return found | dict(metadata.provenance)
+
+
+def is_start_known(noted: Mapping[str, object]) -> bool:
+    """Return False where the start time is that of an import, by the provenance ``noted``."""
+    return "source" not in noted or str(noted.get(START_FROM, FROM_IMPORT)) != FROM_IMPORT
 
 
 def write_provenance(entry: h5py.Group, provenance: Mapping[str, object]) -> None:

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import TypeVar
 
 from dearig.drivers.rig import Event
@@ -13,6 +14,7 @@ from dearig.model.errors import ModelError
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.recording.content.fields import TEXTS
 from dearig.recording.content.layout import EVENT_LEVELS, FORMAT, ZERO_ORDER
+from dearig.recording.content.provenance import is_start_known
 
 __all__ = ["Exported", "exported"]
 
@@ -33,6 +35,7 @@ class Exported:
 
     ``origin`` has those values of the provenance that say where the data are from. ``rest_reading``
     is that of a displacement that is counted from it already, None if the file tells none.
+    ``started`` is the Unix time in s of the start of the run, None if the file does not tell it.
     """
 
     hold: bool = False
@@ -43,6 +46,7 @@ class Exported:
     origin: Mapping[str, object] = field(default_factory=dict)
     rest_reading: float | None = None
     events: tuple[Event, ...] = ()
+    started: float | None = None
 
 
 def exported(about: Mapping[str, str]) -> Exported:
@@ -50,15 +54,17 @@ def exported(about: Mapping[str, str]) -> Exported:
     if about.get("format") != FORMAT:
         return Exported()
     kinematics = about.get("kinematics")
+    noted = _noted(about.get("provenance", ""))
     return Exported(
         hold=about.get("hold") == ZERO_ORDER,
         kinematics=kinematics if kinematics in KINEMATICS else None,
         film=_made(Film, about.get("film", "")),
         load=_made(Load, about.get("load", "")),
         sequence=about.get("sequence", ""),
-        origin=_origin(about.get("provenance", "")),
+        origin=_origin(noted),
         rest_reading=_number(about.get("rest_reading", "")),
         events=tuple(_events(about.get("events", ""))),
+        started=_started(noted),
     )
 
 
@@ -82,14 +88,28 @@ def _events(text: str) -> Iterator[Event]:
                 yield Event(sample, level, message)
 
 
-def _origin(text: str) -> dict[str, object]:
-    """Return the texts of the provenance, seed and model, and whether the rig was simulated."""
+def _noted(text: str) -> dict[str, object]:
+    """Return the provenance in ``text``; empty where it is none."""
     try:
         found = json.loads(text) if text else {}
     except (ValueError, RecursionError):
         return {}
-    if not isinstance(found, dict):
-        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _started(noted: Mapping[str, object]) -> float | None:
+    """Return the start of the run that was exported; None where it was not known there either."""
+    if not is_start_known(noted):
+        return None
+    try:
+        moment = datetime.fromisoformat(str(noted.get("start_time", "")))
+        return moment.timestamp() if moment.tzinfo is not None else None
+    except (OverflowError, OSError, ValueError):
+        return None
+
+
+def _origin(found: Mapping[str, object]) -> dict[str, object]:
+    """Return the texts of the provenance, seed and model, and whether the rig was simulated."""
     return {
         name: found[name]
         for name, kind in _ORIGIN.items()

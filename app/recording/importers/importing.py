@@ -15,6 +15,7 @@ from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.progress import Progress, part, quiet
 from dearig.recording.content.assumed import ASSUMED, FILM_VALUES, assumed_of
 from dearig.recording.content.metadata import RunMetadata
+from dearig.recording.content.provenance import FROM_IMPORT, START_FROM
 from dearig.recording.content.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
 from dearig.recording.files import check_output, file_sha256
 from dearig.recording.importers.columns.choose import choose
@@ -27,6 +28,7 @@ from dearig.recording.importers.columns.chosen import (
 from dearig.recording.importers.columns.plausible import doubts
 from dearig.recording.importers.columns.proposal import first_values
 from dearig.recording.importers.columns.specimen import Specimen
+from dearig.recording.importers.columns.start import Start
 from dearig.recording.importers.columns.values import Values, values_of
 from dearig.recording.importers.exported import exported
 from dearig.recording.importers.quantities.units import UnitScale
@@ -121,6 +123,7 @@ class Prepared:
     kinematics: str | None
     rest_reading: float
     events: tuple[Event, ...]
+    start: Start | None = None
 
     @property
     def imported(self) -> Imported:
@@ -141,7 +144,8 @@ def import_file(
 ) -> Imported:
     """Import a file of measured data as the recording ``out``.
 
-    Time is kept as it is, even or not; a date or the time of a clock is counted from the first one.
+    Time is kept as it is, even or not; a date or the time of a clock is counted from the first one,
+    and gives the start of the recording. Without a date that is the moment of the import, and said.
     Displacement and voltage of an actuator are counted from their means over the lead-in at rest,
     if there is one. A recording that was exported keeps the metadata of that file: film, load,
     kinematics, sequence, and how its voltage was held. ``metadata`` has precedence; its title is
@@ -171,6 +175,7 @@ def import_file(
         kinematics=found.kinematics,
         rest_reading=found.rest_reading,
         events=found.events,
+        started=None if found.start is None else found.start.at,
         overwrite=overwrite,
         now=now,
         progress=part(progress, WRITING, 1.0),
@@ -216,6 +221,10 @@ def prepare(
     progress("checking", READ)
     was = exported(table.about)
     noted = _provenance(path, digest.result(), chosen, options)
+    start = values.start
+    if was.started is not None:
+        start = Start(was.started, "the recording that was exported")
+    noted[START_FROM] = FROM_IMPORT if start is None else start.told_by
     noted = {**was.origin, **noted, **metadata.provenance}
     film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
     rest = 0.0
@@ -239,6 +248,7 @@ def prepare(
         kinematics=kinematics or (None if values.kind == "actuator" else "uniaxial"),
         rest_reading=rest,
         events=tuple(_events(values, was.events)),
+        start=start,
     )
 
 

@@ -93,7 +93,8 @@ class Source(Protocol):
     end early; ``notes``, sentences on what was found; ``progress``, a callable that can be set,
     which gets the part of ``read`` that is done; ``optional``, columns that can be set, for which
     ``read`` raises ``GapError`` where a cell is no number; ``overview(names, count)``, the
-    ``Overview`` of columns, in one reading.
+    ``Overview`` of columns, in one reading; ``began(column)``, the date and time from which a
+    column of time counts, or None; ``started``, that of the first row where no column has it.
     """
 
     @property

@@ -21,6 +21,7 @@ from dearig.model.compiled.trusted_folder import cache_root
 from dearig.recording.content.fields import CONDITIONS, TEXTS, read_texts
 from dearig.recording.content.layout import FORMAT, SIGNALS, counts_name
 from dearig.recording.content.physical import SLICE, Counts, read_channels, sample_count
+from dearig.recording.content.provenance import is_start_known, read_provenance
 from dearig.recording.content.pyramid import reduced
 from dearig.recording.content.safe import Refused, dataset, group, item
 from dearig.recording.content.text import text_of
@@ -61,7 +62,7 @@ OUTLINE = 40
 EVENTS_MAX = 12
 _CACHE_MAX = 2**28  # bytes: ten times the entries of 10,000 recordings
 #: Version of the cache, with the fields that it holds; another one is not read.
-KEPT = f"dearig-index/5 {' '.join((*TEXTS, *CONDITIONS))}"
+KEPT = f"dearig-index/6 {' '.join((*TEXTS, *CONDITIONS))}"
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,8 @@ class Entry:
     and greatest value, of which 0 and 255 are the extremes. ``texts`` are those of
     ``content.fields.TEXTS``; ``room`` has the means of its ``CONDITIONS``, where the recording has
     them. ``events`` are time in s, level and message of the first ``EVENTS_MAX`` events.
-    ``identifier`` tells the recording from every other.
+    ``identifier`` tells the recording from every other. ``start_is_import``: the start time is the
+    moment of an import, since the file does not tell that of the measurement.
 
     ``trouble`` is the reason why it is not a recording, or "". ``passing``: the reason is one of
     the system, not of the file, which may be readable the next time.
@@ -84,6 +86,7 @@ class Entry:
     kind: str = ""
     title: str = ""
     start_time: str = ""
+    start_is_import: bool = False
     samples: int = 0
     duration_s: float | None = None
     complete: bool = False
@@ -117,6 +120,7 @@ _TYPES: Mapping[str, Any] = MappingProxyType(
         "samples": int,
         "duration_s": (int, float, NoneType),
         "complete": bool,
+        "start_is_import": bool,
         "passing": bool,
         "texts": dict,
         "peaks": dict,
@@ -271,6 +275,7 @@ def _entry(path: Path, file: h5py.File, name: str, size: int) -> Entry:
         kind=kind,
         title=_text(entry, "title"),
         start_time=_text(entry, "start_time"),
+        start_is_import=_start_is_import(entry),
         samples=samples,
         duration_s=duration,
         complete=complete,
@@ -336,6 +341,11 @@ def _outline(low: np.ndarray, high: np.ndarray, least: float, most: float) -> st
         return ""
     pairs = np.rint((np.stack((low, high), axis=1) - least) / span * 255.0)
     return pairs.astype(np.uint8).tobytes().hex()
+
+
+def _start_is_import(entry: h5py.Group) -> bool:
+    noted = group(entry, "provenance")
+    return noted is not None and not is_start_known(read_provenance(noted))
 
 
 def _text(parent: h5py.Group, name: str) -> str:
@@ -406,6 +416,8 @@ def lines(entries: Sequence[Entry]) -> list[str]:
         facts = [entry.title, *_peaks_text(entry), *texts]
         if not entry.complete:
             facts.append(f"INCOMPLETE: {entry.outcome}")
+        if entry.start_is_import:
+            facts.append("the time is that of the import")
         told = ", ".join(fact for fact in facts if fact)
         shown.append(f"{local_time(entry.start_time):<25}  {length:>10}  {entry.path}: {told}")
     return shown

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dearig.errors import InputError
+from dearig.recording.content.provenance import is_start_known
 from dearig.recording.content.timestamps import local_time
 from dearig.recording.reading.reader import open_recording
 
@@ -53,7 +54,7 @@ def origin_of(recording: Recording, hashed: bool = True) -> Origin:
         simulated=simulated if isinstance(simulated, bool) else None,
         source=_source(noted),
         seed=seed if isinstance(seed, int) and not isinstance(seed, bool) else None,
-        started=local_time(str(noted.get("start_time", ""))) if "source" not in noted else "",
+        started=local_time(str(noted.get("start_time", ""))) if is_start_known(noted) else "",
         operator=str(noted.get("operator", "")),
         film=_film(recording),
         rig_file=_rig_file(noted),

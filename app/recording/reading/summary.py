@@ -10,6 +10,7 @@ import numpy as np
 
 from dearig.recording.content.fields import CONDITIONS, TEXTS
 from dearig.recording.content.layout import FORMAT, LINEAR, ZERO_ORDER
+from dearig.recording.content.provenance import is_start_known
 from dearig.recording.content.timestamps import local_time
 from dearig.recording.reading.recording import Recording
 
@@ -217,5 +218,7 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
         value = recording.provenance.get(name)
         if value not in (None, ""):
             text = local_time(str(value)) if name == "start_time" else str(value)
+            if name == "start_time" and not is_start_known(recording.provenance):
+                text += ", of the import: the file does not tell that of the measurement"
             rows.append((name.replace("_", " "), text))
     return rows

@@ -49,6 +49,7 @@ def save_recording(
     kinematics: str | None = None,
     rest_reading: float = 0.0,
     events: Iterable[Event] = (),
+    started: float | None = None,
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
     progress: Progress = quiet,
@@ -57,7 +58,8 @@ def save_recording(
 
     ``values`` are (N,) each, by their names in ``layout.UNITS`` and in those units. ``kind`` is
     actuator or film, ``hold`` and ``kinematics`` are as in ``Recording``, ``rest_reading`` in m has
-    been subtracted from the displacement. ``progress`` gets the part that is written. The file
+    been subtracted from the displacement. ``started`` is the Unix time in s of the first sample, by
+    default ``now()``. ``progress`` gets the part that is written. The file
     appears complete or not at all. Raises ``InputError`` if it may not be written, and
     ``ValueError`` for values that no recording of that kind has.
     """
@@ -73,7 +75,7 @@ def save_recording(
         raise ValueError(f"values must be rows of one length, not {shapes}")
     path = check_output(path, overwrite)
 
-    started = now()
+    started = now() if started is None else started
     noted = gather(started, metadata)
     with (
         replaced_when_done(path, overwrite) as partial,

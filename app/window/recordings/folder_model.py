@@ -118,6 +118,10 @@ def _seconds(summary: RecordingSummary) -> str:
     return "" if summary.trouble else f"{significant(summary.duration)} s"
 
 
+def _start(summary: RecordingSummary) -> str:
+    return f"{local_time(summary.started)}{' (import)' if summary.start_is_import else ''}"
+
+
 #: All columns, in their order.
 COLUMNS = (
     ListColumn(
@@ -128,8 +132,9 @@ COLUMNS = (
            lambda s: s.name, lambda s: s.name.casefold(), wide=True),
     ListColumn("Sequence", "Name of the sequence", 130, lambda s: s.title, wide=True),
     *(_text_column(key) for key, field in TEXTS.items() if field.shown),
-    ListColumn("Start", "Start of the run: local time, with its offset from UTC", 178,
-           lambda s: local_time(s.started), lambda s: s.started),
+    ListColumn("Start", "Start of the run: local time, with its offset from UTC; (import): that of "
+           "the import, since the file does not tell it", 178,
+           _start, lambda s: s.started),
     ListColumn("Duration", "Duration in s", 66, _seconds, lambda s: s.duration, number=True),
     _number("Peak kV", "peak_kV", "Largest commanded voltage in kV"),
     _number("Peak mm", "peak_mm", "Largest displacement in mm", width=70),

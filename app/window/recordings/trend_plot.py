@@ -171,6 +171,8 @@ class TrendPlot(QWidget):
 
 def _started(summary: RecordingSummary) -> float | None:
     """Return the start of a run as Unix time in s; None where it is unknown."""
+    if summary.start_is_import:
+        return None
     try:
         return datetime.fromisoformat(summary.started).timestamp()
     except (ValueError, OverflowError, OSError):

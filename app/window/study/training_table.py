@@ -238,6 +238,8 @@ class TrainingTable(QTableWidget):
             return
         item, name = self._item(row, _NAME), summary.name or summary.path.stem
         start = local_time(summary.started)[:_MINUTES] if summary.started else ""
+        if summary.start_is_import:
+            start += " (import)"
         film = f", {summary.film}" if summary.film else ""
         about = f"{summary.path}\n{summary.title}, {seconds(summary.duration)}{film}"
         end = None if summary.trouble else early_end(summary)

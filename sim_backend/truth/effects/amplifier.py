@@ -1,4 +1,4 @@
-"""Amplifier whose output differs from its monitor.
+"""Amplifier whose output differs from the command; ``monitored`` says if its monitor shows it.
 
 ``offset``: a constant voltage, from the output stage. ``saturation``: the algebraic sigmoid
 v/(1 + (v/v_s)^n)^(1/n). ``slew``: a straight line where the command is faster. ``second_order``:
@@ -13,8 +13,9 @@ import numpy as np
 
 from dearig.model.film.material import Load
 from dearig.sim_backend.truth import kernels as loops
-from dearig.sim_backend.truth.effect import Stage, TruthEffect
+from dearig.sim_backend.truth.effect import SupplyStage, TruthEffect
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform
+from dearig.sim_backend.truth.supply import Supply
 
 __all__ = ["offset", "saturation", "second_order", "slew"]
 
@@ -25,7 +26,7 @@ _SHORT = (0.09, 0.62)  # slew limit, as a share of that
 _DELAY = (3.5e-3, 120e-3)  # s behind a steady rise
 
 
-def _stage(stage: Stage, words: str) -> TruthEffect:
+def _stage(stage: SupplyStage, words: str) -> TruthEffect:
     return TruthEffect(family="amplifier", acts_on="amplifier", description=words, on_voltage=stage)
 
 
@@ -33,8 +34,8 @@ def offset(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: 
     """Draw a constant offset of the output."""
     volts = either_sign(generator) * log_uniform(generator, *_OFFSET)
 
-    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
-        return v + volts, carry
+    def stage(time: np.ndarray, supply: Supply, carry: object) -> tuple[Supply, object]:  # noqa: ARG001
+        return supply.mapped(lambda v: v + volts), carry
 
     return _stage(stage, f"the output has an offset of {volts:.3g} V")
 
@@ -45,8 +46,11 @@ def saturation(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
     exponent = generator.uniform(2.5, 8.0)
     at = 8000.0 / ((1.0 - lost) ** -exponent - 1.0) ** (1.0 / exponent)
 
-    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
-        return v / (1.0 + np.abs(v / at) ** exponent) ** (1.0 / exponent), carry
+    def law(v: np.ndarray) -> np.ndarray:
+        return np.asarray(v / (1.0 + np.abs(v / at) ** exponent) ** (1.0 / exponent))
+
+    def stage(time: np.ndarray, supply: Supply, carry: object) -> tuple[Supply, object]:  # noqa: ARG001
+        return supply.mapped(law), carry
 
     return _stage(stage, f"the output is {lost:.2%} too low at 8 kV (exponent {exponent:.2g})")
 
@@ -55,10 +59,11 @@ def slew(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: AR
     """Draw an output with a limited slew rate."""
     fastest = _LOBE * (1.0 - log_uniform(generator, *_SHORT))
 
-    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
-        effective = np.empty_like(v)
+    def stage(time: np.ndarray, supply: Supply, carry: object) -> tuple[Supply, object]:
+        v, starts, effective = supply.pull, np.empty(time.size), np.empty(time.size)
         output = float(np.asarray(0.0 if carry is None else carry))
-        return effective, loops.limit_slew(time, v, fastest, output, effective)
+        output = loops.limit_slew(time, v, fastest, output, effective, starts)
+        return supply.following(effective, starts), output
 
     return _stage(stage, f"the output changes by no more than {fastest / 1e3:.3g} kV/s")
 
@@ -69,11 +74,11 @@ def second_order(generator: np.random.Generator, load: Load) -> TruthEffect:  # 
     damping = generator.uniform(0.5, 0.95)
     frequency = 2.0 * damping / delay
 
-    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
-        effective = np.empty_like(v)
+    def stage(time: np.ndarray, supply: Supply, carry: object) -> tuple[Supply, object]:
+        v, starts, effective = supply.pull, np.empty(time.size), np.empty(time.size)
         state = np.zeros(2) if carry is None else np.array(carry)
-        loops.lag_voltage(time, v, frequency, damping, state, effective)
-        return effective, state
+        loops.lag_voltage(time, v, frequency, damping, state, effective, starts)
+        return supply.following(effective, starts), state
 
     hertz = frequency / (2.0 * math.pi)
     return _stage(stage, f"the output follows at {hertz:.3g} Hz (damping ratio {damping:.2f})")

@@ -5,8 +5,8 @@
 stretched film is v lam/Z, hence lam. ``space_charge``: I = G v^2 lam^4/V_0, limited by the space
 charge in the film (Mott and Gurney's law: square of the voltage, inverse cube of the thickness,
 and area). ``tunnelling``: I = G v^2/B exp(-B/(v lam)), through barriers that the field makes
-thinner (Fowler and Nordheim, Proc. R. Soc. A 119, 1928). The charging of the film through the
-series resistor is neglected: it takes far less than a sample.
+thinner (Fowler and Nordheim, Proc. R. Soc. A 119, 1928). The pull neglects that the film charges
+through the series resistor: it takes less than a millisecond. The current does not.
 """
 
 from __future__ import annotations

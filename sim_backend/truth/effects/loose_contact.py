@@ -6,11 +6,14 @@ While it is open, no voltage reaches the film, which discharges at once.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.sampling import log_uniform
+from dearig.sim_backend.truth.supply import Supply
 
 __all__ = ["loose_contact"]
 
@@ -25,16 +28,17 @@ def loose_contact(generator: np.random.Generator, load: Load) -> TruthEffect:  #
 
     def on_voltage(
         time: np.ndarray,  # noqa: ARG001
-        voltage: np.ndarray,
+        supply: Supply,
         carry: object,
-    ) -> tuple[np.ndarray, object]:
-        size = np.abs(voltage)
+    ) -> tuple[Supply, object]:
+        size = np.abs(supply.pull)
         decided = (size >= closes) | (size < opens)
         # each node takes the state of the last one that was decided, from the carried state on
         last = np.maximum.accumulate(np.where(decided, np.arange(1, size.size + 1), 0))
         closed = np.append(bool(carry), size >= closes)[last]
         # the last node's voltage is not valid yet: take the state of the interval before it
-        return np.where(closed, voltage, 0.0), bool(closed[-2] if closed.size > 1 else carry)
+        reaching = supply.mapped(lambda voltage: np.where(closed, voltage, 0.0))
+        return replace(reaching, joined=closed), bool(closed[-2] if closed.size > 1 else carry)
 
     return TruthEffect(
         family="unknown",

@@ -11,7 +11,7 @@ import numpy as np
 
 from dearig.model.film.material import Load
 from dearig.sim_backend.truth.effect import Course, TruthEffect
-from dearig.sim_backend.truth.film import COURSE_ELECTRIC, COURSE_PULL
+from dearig.sim_backend.truth.film import COURSE_AREA, COURSE_PULL
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform
 
 __all__ = ["electrode_tears", "load_slips", "mount_slips"]
@@ -50,7 +50,7 @@ def electrode_tears(generator: np.random.Generator, load: Load) -> TruthEffect: 
         family="unknown",
         acts_on="electrode",
         description=f"at {moment:.2f} s {lost:.2%} of the electrode is cut off",
-        on_course=_step(COURSE_ELECTRIC, moment, 1.0 - lost),
+        on_course=_step(COURSE_AREA, moment, 1.0 - lost),
     )
 
 

@@ -20,9 +20,10 @@ import numpy as np
 
 from dearig.model.film.material import Load
 from dearig.sim_backend.truth import kernels as loops
-from dearig.sim_backend.truth.effect import Stage, TruthEffect
+from dearig.sim_backend.truth.effect import SupplyStage, TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform
+from dearig.sim_backend.truth.supply import Supply
 
 __all__ = ["contacts", "intercept", "measured_gauge", "slewing_pair", "tanh_stage", "trap_filled"]
 
@@ -36,7 +37,7 @@ _LEAK = (25.0, 500.0)  # V lost at 8 kV
 _STRETCH = 1.2  # about that of the thesis's film
 
 
-def _amplifier(stage: Stage, words: str) -> TruthEffect:
+def _amplifier(stage: SupplyStage, words: str) -> TruthEffect:
     return TruthEffect(family="amplifier", acts_on="amplifier", description=words, on_voltage=stage)
 
 
@@ -49,8 +50,8 @@ def tanh_stage(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
         x -= (np.tanh(x) - (1.0 - lost) * x) / (1.0 / np.cosh(x) ** 2 - (1.0 - lost))
     at = _FULL / x
 
-    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
-        return at * np.tanh(v / at), carry
+    def stage(time: np.ndarray, supply: Supply, carry: object) -> tuple[Supply, object]:  # noqa: ARG001
+        return supply.mapped(lambda v: at * np.tanh(v / at)), carry
 
     return _amplifier(stage, f"the output is a tanh, {lost:.2%} too low at 8 kV")
 
@@ -60,9 +61,12 @@ def intercept(generator: np.random.Generator, load: Load) -> TruthEffect:  # noq
     third = either_sign(generator) * log_uniform(generator, *_LOST)
     fifth = third * generator.uniform(-0.5, 0.5)
 
-    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
+    def law(v: np.ndarray) -> np.ndarray:
         u2 = (v / _FULL) ** 2
-        return v * (1.0 - third * u2 + fifth * u2 * u2), carry
+        return np.asarray(v * (1.0 - third * u2 + fifth * u2 * u2))
+
+    def stage(time: np.ndarray, supply: Supply, carry: object) -> tuple[Supply, object]:  # noqa: ARG001
+        return supply.mapped(law), carry
 
     return _amplifier(
         stage, f"the output is a polynomial with {-third:.2%} and {fifth:.2%} at 8 kV"
@@ -74,10 +78,11 @@ def slewing_pair(generator: np.random.Generator, load: Load) -> TruthEffect:  # 
     delay = log_uniform(generator, *_DELAY)
     slew = log_uniform(generator, *_SLEW)
 
-    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
-        effective = np.empty_like(v)
+    def stage(time: np.ndarray, supply: Supply, carry: object) -> tuple[Supply, object]:
+        v, starts, effective = supply.pull, np.empty(time.size), np.empty(time.size)
         output = float(np.asarray(0.0 if carry is None else carry))
-        return effective, loops.follow_pair(time, v, slew, delay, output, effective)
+        output = loops.follow_pair(time, v, slew, delay, output, effective, starts)
+        return supply.following(effective, starts), output
 
     return _amplifier(
         stage,

@@ -15,11 +15,13 @@ from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effects import end_stop, interference, loose_contact, sudden, thermal
 from dearig.sim_backend.truth.film import NO_COURSE, FilmNumbers, Hidden
 from dearig.sim_backend.truth.plant import TruthPlant
+from dearig.sim_backend.truth.supply import Supply
 from tests.deep import one_of_each
 from tests.sim_backend.truth.test_cases import FORMS
 
 NUMBERS = FilmNumbers.of(THESIS_FILM, THESIS_LOAD, TABLE_3)
-ROWS = ("displacement", "velocity", "capacitance", "leakage", "heating")
+ROWS = ("displacement", "velocity", "heating")
+CURRENTS = ("shown", "output", "voltage", "charge", "step", "charging", "conduction")
 
 
 def drawn(form, seed=0):
@@ -50,9 +52,12 @@ def test_carrying_on_is_the_same_as_going_through(family, form):
     for row in ROWS:
         parts = [getattr(piece, row)[:-1] for piece in pieces[:-1]]
         joined = np.concatenate([*parts, getattr(pieces[-1], row)])
-        same = slice(None, -1)  # the leakage at the last node is that of its voltage
-        np.testing.assert_array_equal(joined[same], getattr(whole, row)[same])
-    assert pieces[-1].displacement[-1] == whole.displacement[-1]
+        np.testing.assert_array_equal(joined, getattr(whole, row))
+    for row in CURRENTS:
+        parts = [getattr(piece.electricity, row) for piece in pieces]
+        np.testing.assert_array_equal(
+            np.concatenate(parts, axis=-1), getattr(whole.electricity, row)
+        )
 
 
 def edges(rate=1000.0, seconds=0.7):
@@ -198,19 +203,6 @@ def test_what_eases_with_speed_is_lost_as_the_law_says(form, left):
     assert speed == pytest.approx(0.0, abs=1e-12 * hidden.friction_stribeck)
 
 
-def test_leakage_is_what_the_series_resistance_passes():
-    for form in ("poole_frenkel", "hopping", "space_charge", "tunnelling"):
-        numbers = drawn(_form(form), 5).on_film(NUMBERS)
-        hidden = numbers.hidden
-        voltage, stretch = np.array([-3000.0, 0.0, 2000.0, 8000.0]), np.full(4, 1.2)
-        current = np.empty(4)
-        film.leakage(hidden, voltage, stretch, current)
-        at_film = np.abs(voltage - hidden.leak_series * current)
-        expected = [film._leak(hidden, v, 1.2)[0] for v in at_film]
-        np.testing.assert_allclose(np.abs(current), expected, rtol=1e-9, atol=1e-18)
-        assert current[0] < 0.0 == current[1] < current[2] < current[3] / 4.0
-
-
 def test_electrode_charges_as_a_capacitor_does():
     """A film too heavy to move: one section charges with R C, the ladder with its own matrix."""
     heavy = replace(NUMBERS, inertia=1e9)
@@ -240,18 +232,26 @@ def test_polarisation_follows_late_and_in_full():
     time = np.arange(2001) * 1e-3
     shares, times = np.array([0.1, 0.2]), np.array([0.05, 0.3])
     effective = np.empty(time.size)
-    slow = np.zeros(2)
-    loops.polarise(time, np.full(time.size, 100.0), shares, times, slow, effective)
+    slow, held = np.zeros(2), np.full(time.size, 100.0)
+    bound, creep = np.empty((2, 2, time.size))
+    ends = np.stack((held, held))
+    loops.polarise(time, held, ends, shares, times, slow, effective, bound, creep)
     late = (shares[:, None] * np.exp(-(time + 5e-4) / times[:, None])).sum(axis=0)
     np.testing.assert_allclose(effective[:-1] ** 2, 1e4 * (1.0 - late[:-1]), rtol=1e-4)
+    missing = shares[:, None] * np.exp(-time / times[:, None])
+    polarised, rate = 1.0 - missing.sum(axis=0), (missing / times[:, None]).sum(axis=0)
+    for end, nodes in enumerate((slice(None, -1), slice(1, None))):
+        np.testing.assert_allclose(bound[end, :-1], 100.0 * polarised[nodes], rtol=1e-10)
+        np.testing.assert_allclose(creep[end, :-1], 100.0 * rate[nodes], rtol=1e-9)
     np.testing.assert_allclose(slow, 100.0 * (1.0 - np.exp(-2.0 / times)), rtol=1e-12)
 
 
 def test_slew_is_a_straight_line_up_to_the_command():
     time = np.arange(11) * 1e-3
-    effective = np.empty(11)
-    end = loops.limit_slew(time, np.full(11, 50.0), 1e4, 0.0, effective)
+    effective, starts = np.empty((2, 11))
+    end = loops.limit_slew(time, np.full(11, 50.0), 1e4, 0.0, effective, starts)
     assert end == 50.0
+    np.testing.assert_allclose(starts, np.minimum(10.0 * np.arange(11), 50.0))
     middle = np.array([5.0, 15.0, 25.0, 35.0, 45.0])
     np.testing.assert_allclose(effective[:5], np.sqrt(middle**2 + 100.0 / 12.0))
     np.testing.assert_array_equal(effective[5:], 50.0)
@@ -260,11 +260,12 @@ def test_slew_is_a_straight_line_up_to_the_command():
 def test_second_order_amplifier_is_the_textbooks():
     time = np.arange(301) * 1e-3
     w, d = 60.0, 0.6
-    output, effective = np.zeros(2), np.empty(time.size)
+    output, effective, starts = np.zeros(2), np.empty(time.size), np.empty(time.size)
     voltage = np.full(time.size, 1000.0)
-    loops.lag_voltage(time, voltage, w, d, output, effective)
+    loops.lag_voltage(time, voltage, w, d, output, effective, starts)
     _, step = signal.step(signal.TransferFunction([w * w], [1.0, 2.0 * d * w, w * w]), T=time)
     np.testing.assert_allclose(effective[:-1], 500.0 * (step[1:] + step[:-1]), atol=1e-6)
+    np.testing.assert_allclose(starts, 1000.0 * step, atol=1e-6)
     assert output[0] == pytest.approx(1000.0 * step[-1], abs=1e-6)
 
 
@@ -335,13 +336,21 @@ def test_what_gives_way_does_so_at_one_moment(form):
     assert np.all(np.diff(differs) == 1)
 
 
-def test_a_torn_electrode_has_less_capacitance():
+def test_a_torn_electrode_has_less_charge_and_the_amplifier_gets_none_back():
     time, voltage = lobes(500.0, 12.0)
     effect = drawn(sudden.electrode_tears)
     torn, _ = TruthPlant.at_rest(NUMBERS, (effect,)).advance(time, voltage, True)
-    drop = 1.0 - np.exp(np.diff(np.log(torn.capacitance)).min())
+    electricity = torn.electricity
+    start, end = electricity.charge
+    held = voltage[:-1] > 100.0
+    capacitance = (start / np.where(held, voltage[:-1], 1.0))[held]
+    drop = 1.0 - np.exp(np.diff(np.log(capacitance)).min())
     lost = float(effect.description.split("%")[0].split()[-1]) / 100.0
     assert drop == pytest.approx(lost, rel=0.1)
+    missing = np.append(0.0, end[:-1]) + electricity.step - start
+    moment = np.argmax(missing)
+    assert missing[moment] == pytest.approx(lost * end[moment - 1], rel=1e-3)
+    assert np.abs(np.delete(missing, moment)).max() < 1e-9 * start.max()
 
 
 def test_a_loose_contact_opens_below_where_it_closes():
@@ -349,7 +358,7 @@ def test_a_loose_contact_opens_below_where_it_closes():
     rise = np.linspace(0.0, 5000.0, 501)
     voltage = np.concatenate((rise, rise[::-1]))
     time = np.arange(voltage.size) * 1e-3
-    passed, _ = effect.on_voltage(time, voltage, None)
+    passed = effect.on_voltage(time, Supply(voltage, voltage, voltage), None)[0].pull
     on = np.flatnonzero(passed)
     closes, opens = voltage[on[0]], voltage[on[-1]]
     words = effect.description.split()

@@ -15,6 +15,7 @@ from dearig.sim_backend.truth.generator_b import dielectric, electric, film, loa
 from dearig.sim_backend.truth.generator_b.spectrum import asymmetric, stretched_exponential
 from dearig.sim_backend.truth.generator_b_laws import Second
 from dearig.sim_backend.truth.plant import TruthPlant
+from dearig.sim_backend.truth.supply import Supply
 
 NUMBERS = FilmNumbers.of(THESIS_FILM, THESIS_LOAD, TABLE_3)
 REST = rest_stretch(NUMBERS)
@@ -172,7 +173,8 @@ def test_terms_follow_havriliak_and_negami(a, b):
 def test_amplifiers_lose_what_they_say():
     for form, sign in ((electric.tanh_stage, 1.0), (electric.intercept, None)):
         effect = drawn(form, 2)
-        out, _ = effect.on_voltage(np.zeros(1), np.array([8000.0]), None)
+        full = np.array([8000.0])
+        out = effect.on_voltage(np.zeros(1), Supply(full, full, full), None)[0].pull
         said = [float(w.strip("%")) / 100.0 for w in effect.description.split() if "%" in w]
         lost = said[0] if sign else -sum(said)
         assert out[0] == pytest.approx(8000.0 * (1.0 - lost), abs=8.0)
@@ -181,13 +183,14 @@ def test_amplifiers_lose_what_they_say():
 def test_a_pair_that_slews_is_its_equation():
     time, slew, delay = np.arange(81) * 1e-3, 4e4, 8e-3
     voltage = np.where(time < 0.04, 900.0, -100.0)
-    effective = np.empty(time.size)
-    end = loops.follow_pair(time, voltage, slew, delay, 0.0, effective)
+    effective, starts = np.empty((2, time.size))
+    end = loops.follow_pair(time, voltage, slew, delay, 0.0, effective, starts)
     exact = solve_ivp(
         lambda t, y: slew * np.tanh(((900.0 if t < 0.04 else -100.0) - y) / slew / delay),
-        (0.0, 0.08), [0.0], "DOP853", rtol=1e-10, atol=1e-9, max_step=1e-3,
-    ).y[0, -1]  # fmt: skip
-    assert end == pytest.approx(exact, abs=0.5)
+        (0.0, 0.08), [0.0], "DOP853", time, rtol=1e-10, atol=1e-9, max_step=1e-3,
+    ).y[0]  # fmt: skip
+    assert end == starts[-1]
+    np.testing.assert_allclose(starts, exact, atol=0.5)
 
 
 def motion(rate=1000.0, seconds=1.0):

@@ -14,6 +14,7 @@ from dearig.recording.importers.columns.chosen import Chosen, Pick
 from dearig.recording.importers.columns.guess import LENGTHS, PULLS
 from dearig.recording.importers.columns.markers import markers_in
 from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
+from dearig.recording.importers.columns.start import Start, start_of
 from dearig.recording.importers.columns.time_faults import (
     check_forward,
     one_clock,
@@ -49,7 +50,8 @@ class Values:
     """Values (n,) of a recording of some ``kind``, by their names in it.
 
     ``left`` are the places of rows that were left out, by the sample before which they stood.
-    ``warnings`` are doubts and ``notes`` what was done to the values.
+    ``warnings`` are doubts and ``notes`` what was done to the values. ``start`` is the start of the
+    measurement, where the file tells it.
     """
 
     kind: str
@@ -57,6 +59,7 @@ class Values:
     left: dict[int, list[str]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    start: Start | None = None
 
 
 def values_of(
@@ -271,6 +274,7 @@ def _read(
     if found["time"].size < 2:
         raise InputError(f"{path} has {found['time'].size} row of data; at least 2 are needed")
     first = float(found["time"][0])
+    values.start = start_of(source, picked["time"].column if "time" in picked else None, first)
     if abs(first) > LONG_AGO:
         found["time"] = found["time"] - first
         values.notes.append(f"time is counted from the first time stamp, {first:.3f} s")

@@ -26,6 +26,7 @@ from dearig.recording.importers.formats.columns import unseen
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
 from dearig.recording.importers.formats.text_layout import TextColumn, TextLayout, layout_of
 from dearig.recording.importers.importer import Importer
+from dearig.recording.importers.quantities.moments import first_moment
 from dearig.recording.importers.source import PARSER_FAILURES, listing, printable
 
 if TYPE_CHECKING:
@@ -85,6 +86,7 @@ class ExcelFile(StoredColumns):
                     _load(sheet, column), None, column.own, column.unit,
                     "time" if column.since is not None else "", table,
                     cell=_cell(sheet, column), row=sheet.row,
+                    began=first_moment(column.since, column.is_open),
                 )  # fmt: skip
         notes = [note for sheet in sheets for note in sheet.layout.notes]
         super().__init__(path, "an Excel workbook", columns, notes=notes)

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from itertools import islice
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from dearig.recording.importers.formats.cells import complaint_about, number_in,
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
 from dearig.recording.importers.formats.text_layout import TextColumn, encoding_of
 from dearig.recording.importers.importer import Importer
-from dearig.recording.importers.quantities.moments import moment_of
+from dearig.recording.importers.quantities.moments import first_moment, is_open_date, moment_of
 from dearig.recording.importers.source import printable
 
 __all__ = ["IMPORTER", "JsonFile"]
@@ -272,12 +273,12 @@ def _stored_rows(
     lines: bool,
     unit: str = "",
 ) -> Stored:
-    dated, label = _dated([get(row) for row in rows[:LOOKED_AT]])
+    dated, label, began = _dated([get(row) for row in rows[:LOOKED_AT]])
     unit = unit or dated
     return Stored(
         lambda: _numbers([get(row) for row in rows]), len(rows), own, unit, label, table,
         cell=lambda index: _complaint(get(rows[index])),
-        row=(lambda index: f"line {index + 1}") if lines else None,
+        row=(lambda index: f"line {index + 1}") if lines else None, began=began,
     )  # fmt: skip
 
 
@@ -286,15 +287,17 @@ def _stored(values: list[Json], own: str, table: str, unit: str = "", label: str
     unit, label = unit or dated[0], label or dated[1]
     return Stored(
         lambda: _numbers(values), len(values), own, unit, label, table,
-        cell=lambda index: _complaint(values[index]),
+        cell=lambda index: _complaint(values[index]), began=dated[2],
     )  # fmt: skip
 
 
-def _dated(values: Sequence[Json]) -> tuple[str, str]:
-    """Return the unit and the label of dates and times of day; both "" for numbers."""
+def _dated(values: Sequence[Json]) -> tuple[str, str, datetime | None]:
+    """Return unit, label and first moment of dates and times of day; "" and None for numbers."""
     first = next((value for value in values if value is not None), None)
     column = None if first is None else _column_of(first)
-    return ("s", "time") if column is not None and column.since is not None else ("", "")
+    if column is None or column.since is None:
+        return "", "", None
+    return "s", "time", first_moment(column.since, is_open_date(str(first)))
 
 
 def _is_column(values: Sequence[Json]) -> bool:

@@ -53,6 +53,7 @@ class ParquetFile(StoredColumns):
                 self._loader(place), rows, place[-1], unit, "time" if is_date else "",
                 ".".join(place[:-1]),
                 cell=self._cell(name),
+                is_utc=getattr(schema.field(place[0]).type, "tz", None) is not None,
             )  # fmt: skip
         super().__init__(
             path, "a Parquet file", columns, separator=".",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
 
@@ -40,6 +41,10 @@ class Stored:
         Returns what is wrong with the value at an index that is no number, in words.
     row : callable, optional
         Returns the place in the file of the value at an index, in words.
+    began : datetime, optional
+        Date and time from which its values count.
+    is_utc : bool
+        True for dates that are of UTC, False for those of a clock on the wall.
     """
 
     load: Callable[[], np.ndarray]
@@ -52,6 +57,8 @@ class Stored:
     start_s: float = 0.0
     cell: Callable[[int], str] | None = None
     row: Callable[[int], str] | None = None
+    began: datetime | None = None
+    is_utc: bool = False
 
 
 class StoredColumns(NamedColumns[Stored]):
@@ -84,6 +91,7 @@ class StoredColumns(NamedColumns[Stored]):
         super().__init__({n: c for n, c in columns.items() if n not in single})
         self._settings = {n: columns[n] for n in single}
         self.step_from = ""
+        self._began: dict[str, datetime] = {}  # of columns of dates that were read
         self._row: Callable[[int], str] | None = None
         if not self._columns:
             raise InputError(f"{path} holds no columns of numbers")
@@ -161,6 +169,10 @@ class StoredColumns(NamedColumns[Stored]):
         cell = self._columns[name].cell if name in self._columns else None
         return "" if cell is None else cell(index)
 
+    def began(self, name: str) -> datetime | None:
+        """Return the date and time from which the column ``name`` counts, once it is read."""
+        return self._began.get(name, self._columns[name].began)
+
     def check(self, name: str) -> None:
         """See ``Source``."""
         if name in self._columns:
@@ -178,7 +190,10 @@ class StoredColumns(NamedColumns[Stored]):
         for number, name in enumerate(names, 1):
             column = self._columns[name]
             try:
-                found[name] = as_numbers(column.load())
+                values = column.load()
+                found[name] = as_numbers(values)
+                if values.dtype.kind == "M" and (first := values[~np.isnat(values)]).size:
+                    self._began[name] = _moment(first[0], column.is_utc)
             except PARSER_FAILURES as error:
                 raise InputError(
                     f"{self.path} cannot be read as {self._what}: {name}: {one_line(error)}"
@@ -198,6 +213,11 @@ def _same_timing(one: Stored, other: Stored) -> bool:
         np.isclose(step, second, rtol=1e-9, atol=0.0)
         and abs(one.start_s - other.start_s) <= START_APART * step
     )
+
+
+def _moment(value: np.datetime64, is_utc: bool) -> datetime:
+    seconds = (value - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+    return datetime(1970, 1, 1, tzinfo=UTC if is_utc else None) + timedelta(seconds=seconds)
 
 
 def as_numbers(values: np.ndarray) -> np.ndarray:

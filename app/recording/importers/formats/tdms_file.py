@@ -8,6 +8,7 @@ import struct
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -67,6 +68,8 @@ class TdmsChannels(StoredColumns):
         if not columns:
             raise InputError(f"{path} holds no channels of numbers")
         super().__init__(path, "a TDMS file", columns, cut_short=_is_cut_short(path))
+        #: date and time of the first sample of the waveforms
+        self.started = None if first is None else _moment(first)
         self.doubts = _appended(path)
 
     def _stored(self, channel: TdmsChannel, first: TdmsTimestamp | None) -> Stored:
@@ -81,6 +84,7 @@ class TdmsChannels(StoredColumns):
             "s" if dates else str(told.get("unit_string", "")),
             "time" if dates else str(told.get("description", "")),
             printable(channel.group_name), step if step > 0.0 else None, start,
+            began=_moment(channel[0]) if dates else None,
         )  # fmt: skip
 
 
@@ -108,6 +112,15 @@ def _seconds(stamps: TdmsTimestamp | TimestampArray, first: TdmsTimestamp) -> An
     """
     fractions = np.asarray(stamps.second_fractions, np.float64) - float(first.second_fractions)
     return np.asarray(stamps.seconds) - np.int64(first.seconds) + fractions * 2.0**-64
+
+
+def _moment(stamp: TdmsTimestamp) -> datetime | None:
+    """Return a time stamp, which is of UTC; None for a year that has no date."""
+    seconds = int(stamp.seconds) + float(stamp.second_fractions) * 2.0**-64
+    try:
+        return datetime(1904, 1, 1, tzinfo=UTC) + timedelta(seconds=seconds)
+    except OverflowError:
+        return None
 
 
 def _number(value: object) -> float:

@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from types import MappingProxyType
 
@@ -41,6 +42,7 @@ from dearig.recording.importers.formats.text_layout import (
 )
 from dearig.recording.importers.formats.text_sections import TextSection, sections_of
 from dearig.recording.importers.importer import Importer
+from dearig.recording.importers.quantities.moments import first_moment
 from dearig.recording.importers.quantities.text_numbers import GROUPED, signs_of
 from dearig.recording.importers.source import GapError, no_such_column, skip_or_refuse
 
@@ -244,6 +246,11 @@ class TextFile(NamedColumns[TextColumn]):
         )  # fmt: skip
         self._said.append(f"{found.thousands!r} in column {name!r} stands between thousands")
         return True
+
+    def began(self, name: str) -> datetime | None:
+        """Return the date and time from which the column ``name`` counts, once it is read."""
+        is_open = any(c.name == name and c.is_open for c in self.layout.columns)
+        return first_moment(self._columns[name].since, is_open)
 
     def _ordered(self, name: str) -> TextColumn:
         """Return the column ``name``, with the order of day and month that the whole file says."""

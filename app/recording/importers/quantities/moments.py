@@ -15,6 +15,7 @@ __all__ = [
     "OpenDatesError",
     "day_first_of",
     "day_first_or_open",
+    "first_moment",
     "is_date",
     "is_open_date",
     "moment_of",
@@ -87,6 +88,17 @@ def moment_of(cell: str, day_first: bool | None = None) -> datetime | None:
         if day is not None:
             return _at(day, *match.group("hour", "minute", "second", "part", "half"))
     return None
+
+
+def first_moment(since: datetime | None, is_open: bool) -> datetime | None:
+    """Return ``since`` if it is a date and time of day that can be meant in one way only.
+
+    ``is_open``: its form does not say whether day or month comes first.
+    """
+    if since is None or since.date() == MIDNIGHT.date():
+        return None
+    twofold = is_open and since.day <= 12 and since.day != since.month
+    return None if twofold else since
 
 
 def is_date(cell: str) -> bool:

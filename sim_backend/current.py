@@ -1,0 +1,142 @@
+"""Current that the amplifier delivers, as its current monitor shows it.
+
+The current is dQ/dt of the film's charge, the conduction through the film, and C dV/dt of the
+cable. The command is a staircase: after each step the amplifier delivers a charge within
+microseconds, by the same lag and the same limits as its output follows, or through the resistance
+of the film's law. The monitor is a first-order lag, so that its integral is the charge whatever the
+shape of the pulse. The slow parts pass it with that delay.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dearig.drivers.settings import AmplifierSettings
+from dearig.model.compiled.jit import jit
+from dearig.sim_backend.plant import Electricity
+
+__all__ = ["CurrentMonitor", "CurrentState"]
+
+
+@jit
+def _crossed(tau: float, blur: float, elapsed: float) -> float:
+    """Return the part of a charge that waits at 0 s and is between both lags ``elapsed`` s later.
+
+    It leaves the first lag with ``tau`` s and the second one with ``blur`` s.
+    """
+    apart = (1.0 / blur - 1.0 / tau) * elapsed
+    between = 1.0 if abs(apart) < 1e-9 else -math.expm1(-apart) / apart
+    return elapsed / tau * math.exp(-elapsed / tau) * between
+
+
+@jit
+def _after(
+    gap: float, ahead: float, tau: float, limit: float, blur: float, elapsed: float
+) -> tuple[float, float]:
+    """Return ``gap`` and ``ahead`` in C ``elapsed`` s later; see ``_deliver``."""
+    line = max(0.0, abs(gap) / limit - tau)  # the limit binds while |gap| > limit tau
+    if line > 0.0:
+        rate, held = math.copysign(limit, gap), min(line, elapsed)
+        gap -= rate * held
+        ahead = rate * blur + (ahead - rate * blur) * math.exp(-held / blur)
+        elapsed -= held
+    ahead = ahead * math.exp(-elapsed / blur) + gap * _crossed(tau, blur, elapsed)
+    return gap * math.exp(-elapsed / tau), ahead
+
+
+@jit
+def _deliver(
+    step: np.ndarray,
+    tau: float,
+    limit: float,
+    blur: float,
+    interval: float,
+    into: float,
+    state: np.ndarray,
+    current: np.ndarray,
+) -> None:
+    """Deliver charges ``step`` (M,) C, one at the start of each interval.
+
+    ``tau`` s is the lag and ``limit`` A the largest current of what delivers, ``blur`` s the lag of
+    the monitor. ``state`` (2,) C is the charge that is still to come and the one that the monitor
+    has not shown; it is updated in place. Fills ``current`` (M,) A, what the monitor shows ``into``
+    s into each interval.
+    """
+    # away from the limit, which is nearly always, all intervals have the same factors
+    kept, crossed = math.exp(-into / blur), _crossed(tau, blur, into)
+    left_all, kept_all = math.exp(-interval / tau), math.exp(-interval / blur)
+    crossed_all = _crossed(tau, blur, interval)
+    gap, ahead = state[0], state[1]
+    for k in range(step.shape[0]):
+        gap += step[k]
+        if abs(gap) <= limit * tau:
+            current[k] = (ahead * kept + gap * crossed) / blur
+            ahead = ahead * kept_all + gap * crossed_all
+            gap *= left_all
+        else:
+            current[k] = _after(gap, ahead, tau, limit, blur, into)[1] / blur
+            gap, ahead = _after(gap, ahead, tau, limit, blur, interval)
+    state[0], state[1] = gap, ahead
+
+
+@dataclass(frozen=True)
+class CurrentState:
+    """State of the current monitor between two chunks.
+
+    ``film`` and ``cable`` are the states in C of ``_deliver``, ``output`` V is the amplifier's.
+    """
+
+    film: tuple[float, float] = (0.0, 0.0)
+    cable: tuple[float, float] = (0.0, 0.0)
+    output: float = 0.0
+
+
+class CurrentMonitor:
+    """Current monitor of an amplifier, in intervals of ``spacing`` s; states are passed around."""
+
+    def __init__(self, settings: AmplifierSettings, spacing: float) -> None:
+        self._spacing = spacing
+        self._cable = settings.cable_pF * 1e-12
+        self._tau = 1.0 / (2.0 * math.pi * settings.bandwidth_kHz * 1e3)
+        self._blur = 1.0 / (2.0 * math.pi * settings.current_monitor_bandwidth_kHz * 1e3)
+
+    def read(
+        self,
+        electricity: Electricity,
+        slew: float,
+        capacitance: float,
+        intervals: slice,
+        into: float,
+        state: CurrentState,
+    ) -> tuple[np.ndarray, CurrentState]:
+        """Return the current in A that is shown ``into`` s into some ``intervals``.
+
+        ``slew`` V/s is the limit of the output, ``capacitance`` F that of the film.
+        """
+        tau = self._tau + electricity.lag
+        step = electricity.step
+        current, film = self._pulses(step, tau, slew * capacitance, into, state.film)
+        # one interval has one current on average, and the charge is its integral
+        x = max(into - self._blur, 0.0) / self._spacing
+        first, last = electricity.charging
+        mean = (electricity.charge[1] - electricity.charge[0]) / self._spacing
+        bulge = 6.0 * x * (1.0 - x) * (mean - 0.5 * (first + last))
+        lost = electricity.conduction[0] * (1.0 - x) + electricity.conduction[1] * x
+        current += first * (1.0 - x) + last * x + bulge + lost
+
+        output, cable = electricity.output, state.cable
+        if self._cable > 0.0:
+            step = self._cable * (output[0] - np.append(state.output, output[1, :-1]))
+            pulses, cable = self._pulses(step, self._tau, slew * self._cable, into, cable)
+            current += pulses + self._cable * (output[1] - output[0]) / self._spacing
+        return current[intervals], CurrentState(film, cable, float(output[1, -1]))
+
+    def _pulses(
+        self, step: np.ndarray, tau: float, limit: float, into: float, before: tuple[float, float]
+    ) -> tuple[np.ndarray, tuple[float, float]]:
+        current, state = np.empty(step.size), np.array(before)
+        _deliver(step, tau, limit, self._blur, self._spacing, into, state, current)
+        return current, (float(state[0]), float(state[1]))
