@@ -503,6 +503,7 @@ def _signature_json(signature: Signature, kind: str) -> dict[str, Any]:
         "is_noise": bool(signature.is_noise),
         "ljung_box_p": _number(signature.ljung_box_p),
         "runs_p": _number(signature.runs_p),
+        "noise_p": _number(signature.noise_p),
         "correlation_time_s": _number(signature.correlation_time),
         "explained": {d.quantity: _number(d.explained) for d in signature.dependences},
         "words": list(signature.words),
