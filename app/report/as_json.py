@@ -381,7 +381,7 @@ def _excitation_json(outcome: DiagnoseOutcome) -> dict[str, Any] | None:
                 "record": asked.name,
                 "open_over_noise": _number(asked.open_rms),
                 "error_share": _number(asked.share),
-                "error_share_above_training_voltage": _number(asked.above),
+                "error_share_beyond_training": _number(asked.above),
                 "not_determined": [
                     {
                         "from_Hz": _number(band.low),
