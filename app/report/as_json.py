@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.results import Candidate, Stage, Step
     from dearig.model.effects import Curve
     from dearig.model.fitting import Estimate
+    from dearig.model.fitting.channels import ChannelResult
     from dearig.model.residual import Signature
 
 __all__ = ["diagnosis_json", "outcome_json"]
@@ -147,8 +148,25 @@ def _comparison_json(comparison: Comparison) -> dict[str, Any]:
         **_noise_json(comparison.kind, (comparison,)),
         "published": _published_json(comparison.published),
         "ended_early": _end_json(comparison),
+        "channels": _channels_json(comparison.channels),
         "warnings": list(comparison.warnings),
     }
+
+
+def _channels_json(channels: tuple[ChannelResult, ...]) -> list[dict[str, Any]]:
+    """Electrical channels in SI units: RMS residual of a mean before and after, and its noise."""
+    return [
+        {
+            "name": c.name,
+            "unit": c.unit,
+            "used": bool(c.used),
+            "noise": _number(c.noise),
+            "before": _number(c.before),
+            "after": _number(c.after),
+            "reason": c.reason or None,
+        }
+        for c in channels
+    ]
 
 
 def _end_json(comparison: Comparison) -> dict[str, Any] | None:
@@ -241,6 +259,9 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "validation": _measures_json(stand.validation, outcome.kind),
                 "indistinguishable_from": list(step.indistinguishable_from),
                 "evidence": _evidence_json(step),
+                "says": [
+                    {"channel": s.channel, "verdict": s.verdict, "text": s.text} for s in step.says
+                ],
                 "nearest_named": step.nearest or None,
                 "curve": _curve_json(step.curve),
             }
@@ -275,6 +296,15 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "probability_missing": _number(outcome.marginals.get(f)),
             }
             for f, p in outcome.families
+        ],
+        "channels": [_displacement_json(outcome), *_channels_json(finding.channels)],
+        "evidence_by_channel": [
+            {"family": family, **{channel: _number(odds) for channel, odds in said}}
+            for family, said in finding.channel_evidence
+        ],
+        "denied": [
+            {"effect": d.effect, "family": d.family, "channel": d.channel, "text": d.text}
+            for d in finding.denials
         ],
         "unnamed": None
         if finding.unnamed is None
@@ -324,6 +354,20 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
     }
 
 
+def _displacement_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
+    """The displacement, or a film's stress, as a channel beside the electrical ones."""
+    finding = outcome.finding
+    return {
+        "name": "displacement" if outcome.kind == "actuator" else "nominal_stress",
+        "unit": "m" if outcome.kind == "actuator" else "Pa",
+        "used": True,
+        "noise": _number(outcome.noise),
+        "before": _number(finding.baseline.train_rms),
+        "after": _number(finding.final.train_rms),
+        "reason": None,
+    }
+
+
 def _excitation_json(outcome: DiagnoseOutcome) -> dict[str, Any] | None:
     """What the validation recordings ask of the model, and what training shows of that."""
     tested, record = outcome.tested, outcome.determining
@@ -342,7 +386,7 @@ def _excitation_json(outcome: DiagnoseOutcome) -> dict[str, Any] | None:
                 "record": asked.name,
                 "open_over_noise": _number(asked.open_rms),
                 "error_share": _number(asked.share),
-                "error_share_above_training_voltage": _number(asked.above),
+                "error_share_beyond_training": _number(asked.above),
                 "not_determined": [
                     {
                         "from_Hz": _number(band.low),
