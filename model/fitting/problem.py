@@ -256,6 +256,10 @@ class Problem:
             return record.coarse_drive, kernel.COARSE
         return record.drive, self.fidelity
 
+    def scaled(self, values: np.ndarray) -> np.ndarray:
+        """Return predictions (P, N) over the noise of a population ``values`` (P, d), natural."""
+        return self.predict(values)[0] / self.sigma
+
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Return (model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
         predicted, _ = self.predict(self.layout.values(x))
