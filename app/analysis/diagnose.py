@@ -428,7 +428,8 @@ def _outcome(
         prediction_errors=prediction_errors(
             [r for r in others if r.name in compared], finding.final
         ),
-        gain=_gain(stands, own, noise) if finding.steps else None,
+        # what happened in the training recordings alone is for no other recording to confirm
+        gain=_gain(stands, own, noise) if any(s.may_recur for s in finding.steps) else None,
     )
     outcome = with_excitation(outcome, settings.rig)
     if not outcome.recommends_final:
@@ -481,8 +482,14 @@ def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
         if found is None:
             return comparison
         # the model of a training recording contains its events already
-        left = found.rms if comparison.role == "validation" else None
-        return replace(comparison, events=found.events, rms_without_events=left)
+        if comparison.role != "validation":
+            return replace(comparison, events=found.events)
+        return replace(
+            comparison,
+            events=found.events,
+            rms_without_events=found.rms,
+            rms_without_drift=found.rms_without_drift,
+        )
 
     return replace(
         stand, train=tuple(map(of, stand.train)), validation=tuple(map(of, stand.validation))

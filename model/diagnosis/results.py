@@ -119,6 +119,11 @@ class Step:
     nearest: str = ""
 
     @property
+    def may_recur(self) -> bool:
+        """Whether other recordings have the effect too: neither a drift nor what happened once."""
+        return self.family != "drift" and EFFECTS[self.effect].is_reproducible
+
+    @property
     def curve(self) -> Curve | None:
         """Return the form that a general law has found; None for a law with a name."""
         draw = EFFECTS[self.effect].curve
