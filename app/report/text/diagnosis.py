@@ -199,7 +199,7 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     if finding.unnamed is not None:
         said.append(_unnamed(outcome))
     said += outcome.performed
-    if finding.rivals and outcome.experiment_words:
+    if (finding.rivals or outcome.is_rejected or outcome.experiment) and outcome.experiment_words:
         said.append(_sentence(outcome.experiment_words))
     if outcome.status == "stopped":
         said.append(
