@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.excitation import Excitation, Tested
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Contribution, Identification
+    from dearig.model.fitting.channels import ChannelResult
     from dearig.model.readings.measures import Errors
     from dearig.recording.reading.early_end import EarlyEnd
     from dearig.recording.reading.origin import Origin
@@ -80,7 +81,9 @@ class Comparison:
     ``rms_without_drift`` that with the events, by which a verdict is made. ``ended``
     says how the run ended if it ended early. ``quiet_count`` are the readings at rest that
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
-    ``step`` is the converter step of ``measured``, 0.0 where it is not known.
+    ``step`` is the converter step of ``measured``, 0.0 where it is not known; each reading is the
+    mean of ``average`` conversions. ``channels`` are the electrical channels, with what the plain
+    circuit and the model leave of them.
     """
 
     name: str
@@ -104,6 +107,8 @@ class Comparison:
     quiet_count: int = 0
     origin: Origin | None = None
     step: float = 0.0
+    average: int = 1
+    channels: tuple[ChannelResult, ...] = ()
 
     @property
     def is_simulated(self) -> bool:
@@ -138,7 +143,11 @@ class Comparison:
             return None
         from dearig.model.fitting.rejection import misfit_p
 
-        return misfit_p(self.measured - self.model, self.measured[: self.quiet_count])
+        return misfit_p(
+            self.measured - self.model,
+            self.measured[: self.quiet_count],
+            averaged=self.average > 1,
+        )
 
     @property
     def steady_rms(self) -> float:

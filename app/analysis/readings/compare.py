@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.readings.measures import errors
 from dearig.model.readings.noise import LEAD_IN
-from dearig.model.readings.records import counted
+from dearig.model.readings.records import counted, mean_about
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.strip import Strip
 from dearig.recording.content.layout import SIGNALS
@@ -24,6 +25,10 @@ from dearig.recording.content.rest_noise import MIN_QUIET
 from dearig.recording.reading.early_end import early_end
 from dearig.recording.reading.origin import origin_of
 from dearig.recording.reading.recording import Recording
+
+if TYPE_CHECKING:
+    # imports SciPy, which a comparison of films does without
+    from dearig.model.fitting.channels import ChannelResult
 
 __all__ = ["compare"]
 
@@ -84,7 +89,19 @@ def compare(
         quiet_count=noise.count if noise and noise.source == LEAD_IN else 0,
         origin=origin_of(recording, hashed),
         step=_converter_step(recording),
+        average=recording.average,
+        channels=_channels(readings, model),
     )
+
+
+def _channels(readings: Readings, model: Actuator | Strip) -> tuple[ChannelResult, ...]:
+    """Return what ``model`` leaves of the voltage monitor and the current of ``readings``."""
+    if not isinstance(model, Actuator) or readings.electric is None:
+        return ()
+    from dearig.model.fitting.channels import Channels, results_of
+
+    channels = Channels([readings.electric], model)
+    return results_of(channels, replace(model, effects=()), model)
 
 
 def _film(readings: Readings, model: Actuator | Strip) -> _Predicted:
@@ -124,7 +141,8 @@ def _actuator(readings: Readings, model: Actuator | Strip) -> _Predicted:
     response = model.simulate(drive, readings.lag)
     if not response.ok:
         raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
-    predicted = counted(response.displacement, readings.lead_in)
+    means = mean_about(response.displacement, recording.average)
+    predicted = counted(means, readings.lead_in)
     usable = np.ones(predicted.size, dtype=bool) if valid is None else valid
     spiky, said = spikes_about(
         recording, readings.displacement - predicted, usable, drive.voltage**2
@@ -140,7 +158,7 @@ def _converter_step(recording: Recording) -> float:
     """
     for channel in recording.channels:
         if channel.name == SIGNALS[recording.kind]:
-            return resolution(channel)
+            return resolution(channel, recording.average)
     levels = np.unique(recording.signal[:_STEP_SAMPLES])
     rises = np.diff(levels)
     if rises.size < MIN_QUIET:

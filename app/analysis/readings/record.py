@@ -8,13 +8,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_banded
 
+from dearig.analysis.readings.channels import electric_of
 from dearig.analysis.readings.early_ends import choose
 from dearig.analysis.readings.opening import Source, open_all
 from dearig.analysis.readings.quality import Quality, check_driven, driven_by, inspect
 from dearig.analysis.readings.room import moisture_of, warmth_of
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
+from dearig.model.readings.channels import ElectricRecord
 from dearig.model.readings.denoise import reading_noise, smoothed
 from dearig.model.readings.noise import LEAD_IN, require_readings, rest_of_rounded, slow_at_rest
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, interpolated
@@ -90,8 +93,17 @@ class Readings:
 
     @property
     def lag(self) -> float:
-        """Time in s from the film's motion to its reading."""
-        return self.recording.displacement_delay - self.recording.displacement_skew
+        """Time in s from the film's motion to its reading, on the clock of the drive.
+
+        A mean of conversions is about the mean of their ticks. The voltage was held for one
+        conversion after each tick, so that its mean belongs half a conversion later.
+        """
+        recording = self.recording
+        lag = recording.displacement_delay - recording.displacement_skew
+        if recording.average == 1 or recording.samples < 2:
+            return lag
+        row = recording.duration / (recording.samples - 1)
+        return lag + 0.5 * row / recording.average
 
     @cached_property
     def voltage(self) -> Drive:
@@ -110,7 +122,9 @@ class Readings:
             noise = reading_noise(volts)
             if noise > 0.0:
                 volts = smoothed(volts, noise)
-            hold = self.is_held or recording.hold
+            if recording.average > 1:
+                volts = _with_means(volts)
+            hold = (self.is_held or recording.hold) and recording.average == 1
             return Drive(recording.time, volts, hold, warmth, moisture, temperature, humidity)
         except ModelError as error:
             raise InputError(f"{recording.path}: {error}") from error
@@ -127,6 +141,14 @@ class Readings:
             return self._record()
         except ModelError as error:
             raise InputError(f"{self.recording.path}: {error}") from error
+
+    @cached_property
+    def electric(self) -> ElectricRecord | None:
+        """The voltage monitor and the current; None for a film, and where neither was recorded."""
+        if self.kind == "film":
+            return None
+        displacement = interpolated(self.recording.time, self.displacement, self.quality.valid)
+        return electric_of(self.recording, self.voltage, displacement, self.drive)
 
     def check_driven(self) -> None:
         """Refuse readings under a drive that never changes, to which nothing can be fitted."""
@@ -172,8 +194,11 @@ class Readings:
             self.lag,
             valid,
             self.lead_in,
+            means_of=recording.average,
+            average=recording.average,
             lag_error=recording.displacement_delay_error,
             rounding=noise.step / math.sqrt(12.0),
+            electric=self.electric,
         )
 
 
@@ -199,6 +224,18 @@ def read_all(
 def recordings_of(readings: Iterable[Readings]) -> list[Recording]:
     """Return the recordings of ``readings``."""
     return [each.recording for each in readings]
+
+
+def _with_means(means: np.ndarray) -> np.ndarray:
+    """Return the voltage (N,) at the middles of rows, between which it is linear, with ``means``.
+
+    The mean of such a line over a row, half-way to each neighbour, is (v[-1] + 6 v[0] + v[1])/8.
+    The square of the voltage, which pulls, then has the right mean too, to the fourth order.
+    """
+    bands = np.full((3, means.size), 0.125)
+    bands[1] = 0.75
+    bands[1, [0, -1]] = 0.875  # beyond the ends it stands still
+    return np.asarray(solve_banded((1, 1), bands, means))
 
 
 def noise_texts(readings: Iterable[Readings]) -> list[str]:
