@@ -337,7 +337,7 @@ def _excitation_json(outcome: DiagnoseOutcome) -> dict[str, Any] | None:
                 "record": asked.name,
                 "open_over_noise": _number(asked.open_rms),
                 "error_share": _number(asked.share),
-                "error_share_above_training_voltage": _number(asked.above),
+                "error_share_beyond_training": _number(asked.above),
                 "not_determined": [
                     {
                         "from_Hz": _number(band.low),
@@ -459,6 +459,7 @@ def _signature_json(signature: Signature, kind: str) -> dict[str, Any]:
         "is_noise": bool(signature.is_noise),
         "ljung_box_p": _number(signature.ljung_box_p),
         "runs_p": _number(signature.runs_p),
+        "noise_p": _number(signature.noise_p),
         "correlation_time_s": _number(signature.correlation_time),
         "explained": {d.quantity: _number(d.explained) for d in signature.dependences},
         "words": list(signature.words),

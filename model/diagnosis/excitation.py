@@ -23,7 +23,7 @@ from dearig.model.verdict import TOLERANCE
 
 __all__ = [
     "BANDS",
-    "VOLTAGE",
+    "LEVELS",
     "Band",
     "Excitation",
     "Motion",
@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 #: Where training shows too little.
-VOLTAGE, BANDS = "voltage", "bands"
+LEVELS, BANDS = "levels", "bands"
 
 _COMPONENTS = 2.0  # of a gain in one band: in phase and in quadrature
 _ALLOWED = TOLERANCE**2 - 1.0  # mean square over that of the noise that counts as noise too
@@ -94,7 +94,7 @@ class Excitation:
     """What the recording ``name`` asks, band by band.
 
     ``shown`` (B,) are the training recordings' energies in the bands. ``above`` is the part of the
-    error above the noise at voltages that are higher than those of training.
+    error above the noise at voltages or displacements that training does not reach.
     """
 
     name: str
@@ -137,11 +137,11 @@ class Excitation:
     def cause(self) -> str:
         """Where most of the error above the noise is and training shows too little.
 
-        ``voltage`` is above that of training, ``bands`` are the bands that are not determined, and
-        "" says that most of the error is elsewhere.
+        ``levels`` are voltages and displacements that training does not reach, ``bands`` the bands
+        that are not determined, and "" says that most of the error is elsewhere.
         """
         if self.above > _HALF:
-            return VOLTAGE
+            return LEVELS
         return BANDS if self.share > _HALF else ""
 
     def after(self, motion: Motion) -> Excitation:
@@ -185,9 +185,13 @@ def excitation(train: Sequence[Motion], asked: Motion, error: np.ndarray) -> Exc
         )
     )
     highest = _LEVEL_RATIO * max(float(np.max(np.abs(m.drive))) for m in train)
+    nearest = min(float(np.min(m.response)) for m in train) - asked.noise
+    farthest = max(float(np.max(m.response)) for m in train) + asked.noise
+    further = np.abs(asked.drive) > highest
+    further |= (asked.response < nearest) | (asked.response > farthest)
     power = np.where(good, (left / asked.noise) ** 2 - 1.0, 0.0)
     total = float(np.sum(power))
-    above = float(np.sum(power[np.abs(asked.drive) > highest])) / total if total > 0.0 else 0.0
+    above = float(np.sum(power[further])) / total if total > 0.0 else 0.0
     return Excitation(asked.name, bands, tuple(shown.tolist()), above)
 
 

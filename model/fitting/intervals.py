@@ -16,6 +16,7 @@ from dearig.model.fitting.problem import Problem
 __all__ = [
     "CHI2_95",
     "BetterPoint",
+    "correlation_end",
     "correlation_time",
     "covariance",
     "firm_directions",
@@ -51,16 +52,34 @@ def correlation_time(residuals: np.ndarray) -> float:
     of independent ones. The sum ends at the first lag whose correlation is within the noise
     (Sokal's window needs a model).
     """
+    correlation = _correlation(residuals)
+    end = _lost_at(correlation, residuals.size)
+    return float(1.0 + 2.0 * correlation[1:end].sum())
+
+
+def correlation_end(residuals: np.ndarray) -> int:
+    """Return the first lag in samples at which ``residuals`` (N,) are no longer correlated.
+
+    It is at least 1, and at most a quarter of N.
+    """
+    return max(1, min(_lost_at(_correlation(residuals), residuals.size), residuals.size // 4))
+
+
+def _correlation(residuals: np.ndarray) -> np.ndarray:
+    """Return the autocorrelation at each lag below half the samples; 0 of what is constant."""
     n = residuals.size
     centred = residuals - residuals.mean()
     spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
     correlation = np.fft.irfft(spectrum)[: n // 2]
-    if correlation[0] <= 0.0:
-        return 1.0
-    correlation /= correlation[0]
-    lost = np.flatnonzero(correlation < 2.0 / math.sqrt(n))
-    end = int(lost[0]) if lost.size else correlation.size
-    return float(1.0 + 2.0 * correlation[1:end].sum())
+    if correlation.size == 0 or correlation[0] <= 0.0:
+        return np.zeros(n // 2)
+    return np.asarray(correlation / correlation[0])
+
+
+def _lost_at(correlation: np.ndarray, samples: int) -> int:
+    """Return the first lag at which a ``correlation`` is within the noise of so many samples."""
+    lost = np.flatnonzero(correlation < 2.0 / math.sqrt(samples))
+    return int(lost[0]) if lost.size else correlation.size
 
 
 def is_flat(residuals: np.ndarray) -> bool:

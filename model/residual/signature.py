@@ -9,16 +9,16 @@ from typing import Protocol
 
 import numpy as np
 from scipy.signal import welch
-from scipy.stats import chi2, norm
 
 from dearig.model.fitting.intervals import correlation_time, unevenness
+from dearig.model.fitting.rejection import noise_test
 from dearig.model.readings.noise import NOISE_MARGIN
 from dearig.model.readings.records import ActuatorRecord, Record
+from dearig.model.verdict import is_rejected
 
 __all__ = ["Dependence", "Signature", "signatures"]
 
 _BY_CHANCE = 1e-3  # significance level of the test for a white spectrum
-_LAGS = 20  # of the Ljung-Box test
 _BINS = 24
 _SHARE = 0.03  # of the residual's variance beyond chance: below, there is no dependence
 _REPORTED_SHARE = 0.1  # the same, for a sentence
@@ -48,10 +48,12 @@ class Signature:
     """Description of the residual of one record.
 
     ``time``, ``residual`` (N,): measured less model, in the measured unit. ``noise`` is the floor
-    of one of these samples. ``ljung_box_p`` and ``runs_p`` are the probabilities that noise alone
-    is as correlated, and changes its sign as rarely. ``frequency`` Hz and ``density`` (F,)
-    are its power spectral density (unit^2/Hz), ``floor_density`` that of the noise. ``words`` are
-    sentences on what is remarkable.
+    of one of these samples. ``ljung_box_p`` and ``runs_p`` are the probabilities that noise as
+    that at rest is as correlated, and changes its sign as rarely. ``is_noise`` is by these, by its
+    size and spectrum (``dearig.model.fitting.rejection``), and by its ``dependences``. ``noise_p``
+    is the probability by all tests. ``frequency`` Hz and ``density`` (F,) are its power spectral
+    density (unit^2/Hz), ``floor_density`` that of the noise. ``words`` are sentences on what is
+    remarkable.
     """
 
     record: str
@@ -70,6 +72,7 @@ class Signature:
     first_less_repeats: float
     is_noise: bool
     words: tuple[str, ...]
+    noise_p: float | None = None
 
 
 class _Scaled(Protocol):
@@ -107,8 +110,13 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     # at rest there is neither loading nor unloading
     moving = np.abs(up) > 0.02 * float(np.max(np.abs(up)) or 1.0)
     used = residual[good]
+    rest = None
+    if isinstance(record, ActuatorRecord):
+        rest = record.displacement[: record.lead_in][good[: record.lead_in]]
+    test = noise_test(used, rest)
     dependences = tuple(
-        _dependence(n, u, q[good], used, up[good], moving[good]) for n, u, q in quantities
+        _dependence(n, u, q[good], used, up[good], moving[good], test.apart)
+        for n, u, q in quantities
     )
     frequency, density = welch(
         residual, 1.0 / step, nperseg=min(max(time.size // 6, 64), 4096, time.size)
@@ -123,16 +131,17 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     # the noise of a film record is a tolerance, whose spectrum need not be flat
     sensed = isinstance(record, ActuatorRecord)
     uneven = unevenness(used, _BY_CHANCE) if sensed else 0.0
+    is_small = rms < NOISE_MARGIN * noise if test.size is None else True
     is_independent = all(d.explained < _SHARE for d in dependences)
-    is_noise = rms < NOISE_MARGIN * noise and is_independent and uneven == 0.0
+    is_noise = is_small and is_independent and not (sensed and is_rejected(test.p))
     return Signature(
         record=record.name,
         time=time,
         residual=residual,
         noise=noise,
         rms=rms,
-        ljung_box_p=_ljung_box(used),
-        runs_p=_runs(used),
+        ljung_box_p=test.ljung_box,
+        runs_p=test.runs,
         correlation_time=correlation_time(used) * step,
         frequency=frequency[1:],
         density=density[1:],
@@ -144,6 +153,7 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
         words=_words(
             record, rms, is_noise, dependences, loops, repeats, frequency, density, step, uneven
         ),
+        noise_p=test.p if sensed else None,
     )
 
 
@@ -175,31 +185,6 @@ def _quantities(
     ], rate
 
 
-def _ljung_box(residual: np.ndarray) -> float:
-    """Return the probability that white noise is as correlated over the first lags."""
-    n = residual.size
-    lags = min(_LAGS, n // 4)
-    centred = residual - residual.mean()
-    total = float(centred @ centred)
-    if total == 0.0 or lags < 1:
-        return 1.0
-    r = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / total
-    statistic = n * (n + 2.0) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
-    return float(chi2.sf(statistic, lags))
-
-
-def _runs(residual: np.ndarray) -> float:
-    """Return the probability that white noise changes sign as rarely (Wald and Wolfowitz)."""
-    up = residual > np.median(residual)
-    a, b = int(np.count_nonzero(up)), int(np.count_nonzero(~up))
-    if a < 2 or b < 2:
-        return 1.0
-    runs = 1 + int(np.count_nonzero(up[1:] != up[:-1]))
-    mean = 1.0 + 2.0 * a * b / (a + b)
-    variance = (mean - 1.0) * (mean - 2.0) / (a + b - 1.0)
-    return float(norm.cdf((runs - mean) / math.sqrt(variance)))
-
-
 def _dependence(
     name: str,
     unit: str,
@@ -207,7 +192,9 @@ def _dependence(
     residual: np.ndarray,
     up: np.ndarray,
     moving: np.ndarray,
+    apart: float,
 ) -> Dependence:
+    """Return how a residual depends on a ``quantity``; noise is correlated over ``apart``."""
     low, high = float(quantity.min()), float(quantity.max())
     edges = np.linspace(low, high if high > low else low + 1.0, _BINS + 1)
     index = np.clip(np.searchsorted(edges, quantity, side="right") - 1, 0, _BINS - 1)
@@ -217,7 +204,7 @@ def _dependence(
     filled = count > 0
     centred = total[filled] / count[filled] - residual.mean()
     between = float(np.sum(count[filled] * centred**2)) / residual.size
-    by_chance = np.count_nonzero(filled) * variance / residual.size
+    by_chance = apart * np.count_nonzero(filled) * variance / residual.size
     return Dependence(
         quantity=name,
         unit=unit,

@@ -28,7 +28,7 @@ def test_one_effect_is_told_with_equation_parameters_and_source() -> None:
     assert "R_0: resistance, between the amplifier and the film at rest, in ohm" in answer.out
     assert "Source: " in answer.out
     bounds = next(line for line in answer.out.splitlines() if line.startswith("gauge"))
-    assert bounds.split() == ["gauge", "g", "-60.0", "60.0"]
+    assert bounds.split() == ["gauge", "g", "-300", "300"]
 
 
 def test_one_effect_as_json_has_latex_and_si_units() -> None:

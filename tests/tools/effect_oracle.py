@@ -619,6 +619,15 @@ def extra(name, p, film, drive):
             soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * z[0],
             slopes=lambda t, lam, u, z, v: (((v / 5e3) ** 2 - z[0]) / p["time_constant"],),
         ),
+        "loss heating": lambda: Extra(
+            states=1,
+            soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * z[0],
+            slopes=lambda t, lam, u, z, v: (
+                # the voltage is straight between its corners
+                (abs(v * (drive(t + 1e-6) - drive(t - 1e-6)) / 2e-6) / 5e3**2 - z[0])
+                / p["time_constant"],
+            ),
+        ),
         "self-heating in stages": lambda: Extra(
             states=2,
             soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * z[0] + p["later"] * z[1],

@@ -237,13 +237,9 @@ def _residual(
 ) -> RecordSection:
     kind = outcome.kind
     after = _same(signatures_of(outcome)[1], before.record) if changed else None
-    words = [
-        *before.words,
-        f"the correlation time of the residual is {_duration(before.correlation_time)}; noise "
-        f"alone is as correlated with probability {_probability(before.ljung_box_p)} "
-        f"(Ljung-Box test), and changes its sign as seldom with probability "
-        f"{_probability(before.runs_p)} (runs test)",
-    ]
+    words = [*before.words, _tests_text(before)]
+    if after is not None:
+        words += [f"after: {word}" for word in (*after.words, _tests_text(after))]
     when = "before and after, each on its own scale" if after is not None else "over time"
     wide = (
         picture(
@@ -269,6 +265,16 @@ def _residual(
     )
     return RecordSection(
         before.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in words), wide, small
+    )
+
+
+def _tests_text(signature: Signature) -> str:
+    """Return how probable the colour of a residual is by noise alone."""
+    return (
+        f"the correlation time of the residual is {_duration(signature.correlation_time)}; noise "
+        f"alone is as correlated with probability {_probability(signature.ljung_box_p)} "
+        f"(Ljung-Box test), and changes its sign as seldom with probability "
+        f"{_probability(signature.runs_p)} (runs test)"
     )
 
 

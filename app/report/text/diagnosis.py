@@ -136,6 +136,10 @@ def headline(outcome: DiagnoseOutcome) -> str:
         limits.append("by which effect these data cannot tell")
     if judgement.verdict in ("explained", "nothing_missing") and not outcome.after.validation:
         limits.append("no validation recording was given")
+    if judgement.verdict in ("explained", "nothing_missing") and not all(
+        s.is_noise for s in finding.after
+    ):
+        limits.append("what is left is as small as the noise, but does not look like it")
     ended = [c.marked_name for c in outcome.after.train if c.ended and not c.ended.is_cut]
     if ended:
         limits.append(f"ended early: {listed(ended)}")

@@ -18,7 +18,7 @@ __all__ = ["tested_texts", "undetermined_texts"]
 
 def undetermined_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
     """Yield sentences on what validation asks and training does not show, and on what would."""
-    from dearig.model.diagnosis.excitation import BANDS, VOLTAGE
+    from dearig.model.diagnosis.excitation import BANDS, LEVELS
 
     for asked in outcome.undetermined:
         bands = asked.undetermined
@@ -28,10 +28,11 @@ def undetermined_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
                 f"{_bands_text(bands)}: {significant(100.0 * asked.share, 2)} % of its error above "
                 f"the noise lies there."
             )
-        elif asked.cause == VOLTAGE:
+        elif asked.cause == LEVELS:
             yield (
-                f"{asked.name} goes to a higher voltage than the training recordings, and "
-                f"{significant(100.0 * asked.above, 2)} % of its error above the noise lies there."
+                f"{asked.name} goes to voltages or displacements that the training recordings do "
+                f"not reach: {significant(100.0 * asked.above, 2)} % of its error above the noise "
+                f"lies there."
             )
         else:
             yield (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dearig.config.sequencefile import load_sequence
-from dearig.model.diagnosis.excitation import BANDS, VOLTAGE, Motion, excitation, range_of
+from dearig.model.diagnosis.excitation import BANDS, LEVELS, Motion, excitation, range_of
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.verdict import TOLERANCE
@@ -45,7 +45,7 @@ def test_a_gain_is_known_to_what_least_squares_leaves_of_it() -> None:
     """Equation (10), against fits of the two components of a gain to many noises."""
     time = np.arange(4000) * STEP
     shown = Motion(
-        "tone", STEP, np.zeros(1), 0.2 * NOISE * np.sin(2.0 * np.pi * 30.0 * time), NOISE
+        "tone", STEP, np.zeros(4000), 0.2 * NOISE * np.sin(2.0 * np.pi * 30.0 * time), NOISE
     )
     rng = np.random.default_rng(3)
     both = np.column_stack([np.sin(2.0 * np.pi * 30.0 * time), np.cos(2.0 * np.pi * 30.0 * time)])
@@ -107,8 +107,19 @@ def test_a_voltage_above_that_of_training() -> None:
     high = motion(VALIDATION[0])
     wrong = NOISE * np.random.default_rng(1).standard_normal(high.response.size)
     wrong[np.abs(high.drive) > 0.7 * np.max(high.drive)] += 5.0 * NOISE
-    assert excitation([low], high, wrong).cause == VOLTAGE
-    assert excitation([motion("thesis")], high, wrong).above == 0.0
+    assert excitation([low], high, wrong).cause == LEVELS
+    assert excitation([low, high], high, wrong).above == 0.0
+
+
+def test_a_displacement_beyond_that_of_training() -> None:
+    slow, quick = motion(VALIDATION[0]), motion(VALIDATION[1])
+    wrong = NOISE * np.random.default_rng(1).standard_normal(slow.response.size)
+    far = slow.response > np.max(quick.response) + 2.0 * NOISE
+    wrong[far] += 5.0 * NOISE
+    # the same voltage, held for longer
+    higher = Motion("quick", STEP, np.full_like(quick.drive, 8e3), quick.response, NOISE)
+    assert excitation([higher], slow, wrong).cause == LEVELS
+    assert excitation([higher, slow], slow, wrong).above == 0.0
 
 
 def test_readings_that_must_not_be_used_do_not_count() -> None:

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -266,14 +267,28 @@ def read(name, values, time):
     return shown
 
 
-def shown_by_averaging(p, time):
+def mean_of(start, end):
+    """Mean position between two times, which are arrays; it was at rest before 0."""
     w = 2.0 * math.pi * 3.0
 
     def integral(t):
-        t = np.maximum(t, 0.0)  # it was at rest before
+        t = np.maximum(t, 0.0)
         return 6e-4 * (t - np.sin(w * t) / w) + 0.5e-4 * t**2
 
-    return (integral(time) - integral(time - p["window"])) / p["window"]
+    return (integral(end) - integral(start)) / (end - start)
+
+
+def shown_by_averaging(p, time):
+    return mean_of(time - p["window"], time)
+
+
+def shown_by_ages(p, time):
+    edges = p["delay"] + p["age"] * np.array([0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
+    shares = [p[f"share_{i}"] for i in range(1, 7)]
+    means = [mean_of(time - b, time - a) for a, b in pairwise(edges)]
+    return (1.0 - sum(shares)) * moved(time)[0] + sum(
+        w * m for w, m in zip(shares, means, strict=True)
+    )
 
 
 def shown_by_lag(p, time):
@@ -321,6 +336,7 @@ SHOWN = {
             ]
         )
     ),
+    "general sensor lag": shown_by_ages,
     "sensor averaging": shown_by_averaging,
     "sensor delay": lambda p, t: moved(np.maximum(t - p["delay"], 0.0))[0],
     "sensor bend": lambda p, t: moved(t)[0] + p["cubic"] * moved(t)[0] ** 3,

@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import kstest
 
 from dearig.model.residual.signature import signatures
+from dearig.model.verdict import REJECTED_BELOW
 from tests.tools.engine import (
     NOISE,
     PLAIN,
@@ -126,6 +127,30 @@ def test_runs_ask_for_too_few_changes_of_sign_only():
     s = look(alternating)
     assert s.runs_p > 0.99
     assert s.ljung_box_p < 1e-12
+
+
+def test_what_is_called_noise_is_denied_by_no_test():
+    for seed in range(20):
+        for along in (0.0, 0.03, 0.1, 0.3):
+            s = look(correlated(seed, along))
+            # one of three tests, of which the least counts three times
+            least = min(s.ljung_box_p, s.runs_p)
+            assert not (s.is_noise and least < REJECTED_BELOW / 3.0)
+            assert s.noise_p is not None
+            assert s.is_noise or s.noise_p < REJECTED_BELOW or s.rms > NOISE
+    assert not any(look(correlated(seed, 0.3)).is_noise for seed in range(20))
+
+
+def test_noise_as_coloured_as_the_readings_at_rest_is_noise():
+    found = []
+    for seed in range(20):
+        at_rest = np.where(np.arange(record().time.size) < 400, 1.0, 0.0) * correlated(seed, 0.4)
+        moved = np.where(at_rest == 0.0, record().displacement, at_rest)
+        still = replace(record(), displacement=moved, lead_in=400)
+        found.append(look(correlated(seed + 100, 0.4), still))
+        assert not look(correlated(seed, 0.95), still).is_noise
+    assert sum(s.is_noise for s in found) >= 18
+    assert all(min(s.ljung_box_p, s.runs_p) > 1e-4 for s in found if s.is_noise)
 
 
 def test_too_much_noise_is_not_the_noise():

@@ -1,8 +1,8 @@
 """Resistance of electrodes that lose contact as they are stretched, or gain it.
 
 As ``electrode resistance``, with R = R_0 exp(g (lam - lam_rest)): carbon black, grease and thin
-metal change their resistance with strain, by a gauge factor g of a few, and of tens near
-percolation.
+metal change their resistance with strain, by a gauge factor g of a few, and of tens to hundreds
+near percolation. Electrodes that come apart by more than e^40 do not conduct.
 """
 
 from __future__ import annotations
@@ -39,17 +39,20 @@ EFFECT = Effect(
         Parameter(
             "gauge",
             "",
-            (-60.0, 60.0),
+            (-300.0, 300.0),
             "relative change of the resistance per change of stretch",
             5.0,
-            starts=(10.0,),
+            starts=(10.0, 100.0),
         ),
     ),
     memory=1,
 )
 
 
+_APART = 40.0  # e^40 times 1 Mohm and 1 pF is a time of 7,000 years
+
+
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
-    resistance = c[k] * math.exp(c[k + 1] * (lam - c[REST]))
+    resistance = c[k] * math.exp(min(c[k + 1] * (lam - c[REST]), _APART))
     return charged(c, m, j, resistance, start, end, h, lam, rate)
