@@ -117,10 +117,12 @@ def correlation_figure(names: Sequence[str], covariance: np.ndarray) -> Figure:
     matrix, count = correlations(covariance), len(names)
     labels = [drawable(symbol(n).replace("_", " "), 22) for n in names]
     with style():
-        figure = blank(WIDTH, 1.2 + 0.32 * count)
+        figure = blank(WIDTH, 2.0 + 0.26 * count)
         ax = figure.subplots()
-        ax.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
-        ax.set_xticks(range(count), labels, rotation=90)
+        # cells are drawn as shapes: a page shows no pictures of points
+        ax.pcolormesh(range(count), range(count), matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+        ax.invert_yaxis()
+        ax.set_xticks(range(count), labels, rotation=45, ha="right", rotation_mode="anchor")
         ax.set_yticks(range(count), labels)
         ax.grid(visible=False)
         if count <= _NUMBERS_MAX:

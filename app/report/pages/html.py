@@ -292,7 +292,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
     pictures = [("Training", tuple(others))] if others else []
     if outcome.validation:
         pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
-    parameter_pictures = (
+    parameter_pictures: tuple[Picture, ...] = (
         picture(
             parameters_figure(fit),
             prefixes,
