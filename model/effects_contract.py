@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from dearig.model import kernel
+from dearig.model.circuit import loop as circuit
 from dearig.model.coefficients import AIR_HUMIDITY, AIR_TEMPERATURE, EFFECTS_AT
 from dearig.model.effects.description import Effect, Parameter, faults_of
 from dearig.model.effects.hooks import FASTEST, HOOKS
@@ -35,15 +36,28 @@ _SLOPE_TOLERANCE = 0.02  # of a derivative
 _SLOPE_NOTHING = 1.0  # Pa: a ten-thousandth of a film's
 _DRAG_NOTHING = 0.1  # Pa s: 0.05 Pa at the fastest edge
 _JUMP_TOLERANCE = 0.02  # of the changes within steps
+_DROP_NOTHING = 1e-3  # V
 _NEARLY_NEUTRAL = 1e-7  # of the typical amplitude
 _NEARLY_NOTHING = {"voltage": 0.05e-6, "stretch": 0.05}  # m, Pa: another choice of steps
 _STEP_ERROR = 0.2e-6  # m: a fifth of the sensor's repeatability
 _STEP_ERROR_PART = 0.02  # of what the effect does
+_CIRCUIT_NOTHING = 1e-4  # of the largest voltage or current
 _BASIS_TOLERANCE = 1e-9  # of the largest value
 
 _AIR = (2.0, 0.1)  # K and relative humidity above the reference
 
-_PURE = ("at_rest", "inertia", "permittivity", "soften", "stress", "stiffness", "measured_stress")
+_PURE = (
+    "at_rest",
+    "inertia",
+    "permittivity",
+    "charge",
+    "conduct",
+    "drop",
+    "soften",
+    "stress",
+    "stiffness",
+    "measured_stress",
+)
 _SUPPLY = ("supply", "polarise")
 _RATES = (0.0, 1e-3, 0.01, 0.03, 0.1, 0.3, FASTEST)
 
@@ -67,10 +81,10 @@ def faults_of_effect(name: str) -> list[str]:
     faults = [*faults_of(EFFECTS[name], with_law=ours), *hook_faults(PLACES[name].module)]
     if not faults:
         probe = _Probe(name)
-        for check in (_values, _pure, _stiffness, _joins, _rest, _supplies, _basis):
+        for check in (_values, _pure, _stiffness, _joins, _rest, _supplies, _drops, _basis):
             faults += dict.fromkeys(check(probe))
     if not faults:
-        faults += _in_simulations(name)
+        faults += [*_in_circuits(name), *_in_simulations(name)]
     return faults
 
 
@@ -143,7 +157,7 @@ def _arguments(hook: str, probe: _Probe, step: tuple[float, float, float, float]
     known = {
         "t": 1.0, "start": 5e3, "end": 6e3, "h": h, "lam": lam, "rate": rate, "lam0": lam0,
         "since": h, "warmth": 0.5, "moisture": 0.05, "field2": 36e6, "sigma": -50.0, "dt": h,
-        "x": (lam / probe.rest - 1.0) * 0.08, "u": rate / probe.rest * 0.08,
+        "voltage": 5.5e3, "x": (lam / probe.rest - 1.0) * 0.08, "u": rate / probe.rest * 0.08,
     }  # fmt: skip
     return [known[name.strip()] for name in HOOKS[hook].arguments.split(",") if name]
 
@@ -301,6 +315,25 @@ def _supplies(probe: _Probe) -> Iterator[str]:
             yield f"its {hook} jumps by {jump:.3g} between two steps, of {scale:.3g}"
 
 
+def _drops(probe: _Probe) -> Iterator[str]:
+    """``drop`` is the difference between the voltage before ``supply`` and after it."""
+    if not (probe.has("drop") and probe.has("supply")):
+        return
+    c, m = probe.coefficients(tuple(values_of(probe.effect).values())), probe.state()
+    start, h = 0.0, 1e-2
+    for n in range(1, 200):
+        end = 8e3 * math.sin(0.05 * n)
+        _, after = probe.call("supply", c, m, n * h, start, end, h, probe.rest, 0.0)
+        dropped = float(probe.call("drop", c, m, after)[0])
+        if not abs(after + dropped - end) < _JUMP_TOLERANCE * abs(end - after) + _DROP_NOTHING:
+            yield (
+                f"its drop is {dropped:.4g} V where its supply takes {end - after:.4g} V of "
+                f"{end:.4g} V"
+            )
+            return
+        start = end
+
+
 def _basis(probe: _Probe) -> Iterator[str]:
     """``drift_basis`` is what ``sense`` adds for each amplitude."""
     if probe.effect.drift_basis is None:
@@ -335,6 +368,35 @@ def _with(effect: Effect, driven: str, amplitude: float) -> Actuator | Strip:
 @cache
 def _without(driven: str) -> np.ndarray:
     return _simulated(_base(driven))
+
+
+def _in_circuits(name: str) -> Iterator[str]:
+    """Nearly neutral, the film's voltage and current are those without it, and they are finite."""
+    effect = EFFECTS[name]
+    if "voltage" not in effect.drives or PLACES[name].is_sensor:
+        return
+    plain, near, full = (_circuit(effect, amplitude) for amplitude in (0.0, _NEARLY_NEUTRAL, 1.0))
+    for row, unit in ((circuit.OUTPUT, "V"), (circuit.FILM, "V"), (circuit.INTO, "A")):
+        left = np.abs(near[row] - plain[row]).max()
+        if not left < _CIRCUIT_NOTHING * np.abs(plain[row]).max():
+            yield f"{left:.3g} {unit} of it are left in the circuit near its neutral values"
+    if not np.isfinite(full).all():
+        yield "voltage, charge or current are not finite"
+
+
+def _circuit(effect: Effect, amplitude: float) -> np.ndarray:
+    """Rows of the circuit under two lobes along a stretch that follows them."""
+    base = _base("voltage")
+    model = base if amplitude == 0.0 else _with(effect, "voltage", amplitude)
+    if not isinstance(model, Actuator):
+        raise ModelError("a strip has no circuit")
+    time = np.linspace(0.0, 2.0, 401)
+    volts = np.where(time < 1.0, 6e3, 8e3) * np.sin(math.pi * (time % 1.0))
+    drive = Drive(time, volts, warmth=0.1 * time, moisture=0.02 * time)
+    c = model.coefficients()
+    _, rest = at_rest(c, drive)
+    stretch = rest + 0.02 * (volts / 8e3) ** 2
+    return circuit.follow(c, drive.time, drive.voltage, drive.ends, drive.air, stretch)
 
 
 def _in_simulations(name: str) -> Iterator[str]:

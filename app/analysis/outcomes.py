@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.excitation import Excitation, Tested
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Contribution, Identification
+    from dearig.model.fitting.channels import ChannelResult
     from dearig.model.readings.measures import Errors
     from dearig.recording.reading.early_end import EarlyEnd
     from dearig.recording.reading.origin import Origin
@@ -79,7 +80,8 @@ class Comparison:
     without the recording's own drift and ``events``, None where it has none of these. ``ended``
     says how the run ended if it ended early. ``quiet_count`` are the readings at rest that
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
-    ``step`` is the converter step of ``measured``, 0.0 where it is not known.
+    ``step`` is the converter step of ``measured``, 0.0 where it is not known. ``channels`` are the
+    electrical channels, with what the plain circuit and the model leave of them.
     """
 
     name: str
@@ -102,6 +104,7 @@ class Comparison:
     quiet_count: int = 0
     origin: Origin | None = None
     step: float = 0.0
+    channels: tuple[ChannelResult, ...] = ()
 
     @property
     def is_simulated(self) -> bool:

@@ -1,4 +1,4 @@
-"""Commands that look up and set up: files to begin with, presets, laws, doctor, docs."""
+"""Commands that look up, set up and hand on: files to begin with, reports, laws, doctor, docs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 from dearig.cli.docs import docs
 from dearig.cli.options import Force, Json
-from dearig.cli.output import check_files, console_for, print_line, write_result
+from dearig.cli.output import check_files, console_for, print_line, working, write_result
 
 __all__ = ["commands"]
 
@@ -17,9 +17,18 @@ commands = typer.Typer()
 ToWrite = Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")]
 _PANEL = "Set-up and help"
 _MODELS = "Models"
+_REPORTS = "Reports"
+Result = Annotated[
+    Path,
+    typer.Argument(
+        metavar="REPORT",
+        help="A report (HTML) of identify, validate, diagnose or demo, or the JSON of such a "
+        "result.",
+    ),
+]
 
 
-@commands.command(rich_help_panel=_PANEL)
+@commands.command(rich_help_panel=_REPORTS)
 def pdf(
     report: Annotated[
         Path, typer.Argument(metavar="REPORT.html", help="A report of this program.")
@@ -39,6 +48,58 @@ def pdf(
     check_files(force, (report,), written, json=None)
     print_report(report, written, force)
     print_line(console_for(), str(written))
+
+
+@commands.command(rich_help_panel=_REPORTS)
+def report(
+    result: Result,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="HTML or PDF to write.")],
+    force: Force = False,
+) -> None:
+    """Write a report again from its JSON, as this version of the program shows it."""
+    from dearig.report.again import write_again
+
+    check_files(force, (result,), out, json=None)
+    with working(None, computes=False) as (console, progress):
+        progress("report", 0.0)
+        write_again(result, out, force)
+    print_line(console, str(out))
+
+
+@commands.command(rich_help_panel=_REPORTS)
+def figures(
+    result: Result,
+    to: Annotated[
+        Literal["pdf", "svg", "png"],
+        typer.Option(help="PDF with TrueType fonts, SVG with text as text, or PNG at 600 dpi."),
+    ],
+    columns: Annotated[
+        int,
+        typer.Option(min=1, max=2, help="Width in columns of a journal: 89 mm or 183 mm."),
+    ] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", help="Folder to write to.", show_default="next to the report"
+        ),
+    ] = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Draw the figures of a report for print, with their captions in a text file."""
+    from dearig.recording.result_folder import result_folder
+    from dearig.report.again import read_result, write_figures
+
+    check_files(force, (result,), json=json)
+    read = read_result(result)  # before a folder is made
+    folder = result_folder(out or result.with_name(f"{result.stem}-figures"), force)
+    with working(json, computes=False, whole=True) as (console, progress):
+        written, captions = write_figures(read, to, columns, folder, progress)
+    for figure in written:
+        print_line(console, f"{figure.path}: {figure.caption}")
+    print_line(console, f"Captions: {captions}")
+    found = [{"number": f.number, "file": str(f.path), "caption": f.caption} for f in written]
+    write_result({"format": "dearig-figures/1", "columns": columns, "figures": found}, json)
 
 
 @commands.command("rig-file", rich_help_panel=_PANEL)

@@ -14,6 +14,8 @@ from dearig.analysis.outcomes import (
     pooled_steady_rms,
 )
 from dearig.model.verdict import is_rejected, smallest_p
+from dearig.report.made import made_now
+from dearig.report.stored import stored
 from dearig.report.text.laws import effect_named, law_json
 from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.results import Candidate, Stage, Step
     from dearig.model.effects import Curve
     from dearig.model.fitting import Estimate
+    from dearig.model.fitting.channels import ChannelResult
     from dearig.model.residual import Signature
 
 __all__ = ["diagnosis_json", "outcome_json"]
@@ -55,6 +58,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
             **_rejection_json(outcome.comparisons),
             "recordings": [_comparison_json(c) for c in outcome.comparisons],
             "warnings": list(warnings_of(outcome)),
+            "report": stored((outcome,), made_now()),
         }
     fit = outcome.fit
     known = fit.covariance.size > 0
@@ -82,6 +86,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "assumed": outcome.assumed,
         "seconds": _number(outcome.seconds),
         "warnings": list(warnings_of(outcome)),
+        "report": stored((outcome,), made_now()),
     }
 
 
@@ -143,8 +148,25 @@ def _comparison_json(comparison: Comparison) -> dict[str, Any]:
         **_noise_json(comparison.kind, (comparison,)),
         "published": _published_json(comparison.published),
         "ended_early": _end_json(comparison),
+        "channels": _channels_json(comparison.channels),
         "warnings": list(comparison.warnings),
     }
+
+
+def _channels_json(channels: tuple[ChannelResult, ...]) -> list[dict[str, Any]]:
+    """Electrical channels in SI units: RMS residual of a mean before and after, and its noise."""
+    return [
+        {
+            "name": c.name,
+            "unit": c.unit,
+            "used": bool(c.used),
+            "noise": _number(c.noise),
+            "before": _number(c.before),
+            "after": _number(c.after),
+            "reason": c.reason or None,
+        }
+        for c in channels
+    ]
 
 
 def _end_json(comparison: Comparison) -> dict[str, Any] | None:
@@ -237,6 +259,9 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "validation": _measures_json(stand.validation, outcome.kind),
                 "indistinguishable_from": list(step.indistinguishable_from),
                 "evidence": _evidence_json(step),
+                "says": [
+                    {"channel": s.channel, "verdict": s.verdict, "text": s.text} for s in step.says
+                ],
                 "nearest_named": step.nearest or None,
                 "curve": _curve_json(step.curve),
             }
@@ -271,6 +296,15 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "probability_missing": _number(outcome.marginals.get(f)),
             }
             for f, p in outcome.families
+        ],
+        "channels": [_displacement_json(outcome), *_channels_json(finding.channels)],
+        "evidence_by_channel": [
+            {"family": family, **{channel: _number(odds) for channel, odds in said}}
+            for family, said in finding.channel_evidence
+        ],
+        "denied": [
+            {"effect": d.effect, "family": d.family, "channel": d.channel, "text": d.text}
+            for d in finding.denials
         ],
         "unnamed": None
         if finding.unnamed is None
@@ -316,6 +350,21 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "model_path": outcome.model_path,
         "simulations": int(finding.simulations),
         "seconds": _number(outcome.seconds),
+        "report": stored((outcome,), made_now()),
+    }
+
+
+def _displacement_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
+    """The displacement, or a film's stress, as a channel beside the electrical ones."""
+    finding = outcome.finding
+    return {
+        "name": "displacement" if outcome.kind == "actuator" else "nominal_stress",
+        "unit": "m" if outcome.kind == "actuator" else "Pa",
+        "used": True,
+        "noise": _number(outcome.noise),
+        "before": _number(finding.baseline.train_rms),
+        "after": _number(finding.final.train_rms),
+        "reason": None,
     }
 
 

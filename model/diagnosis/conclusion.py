@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dearig.model.diagnosis.channels import ChannelSays
 from dearig.model.diagnosis.engine import Race, SearchResult
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter, fit_of, gain_that_ends
@@ -21,6 +22,7 @@ from dearig.model.diagnosis.results import (
 )
 from dearig.model.diagnosis.stages import DRIFT_LAW, stage_of
 from dearig.model.effects import EFFECTS
+from dearig.model.fitting.channels import ChannelResult, is_electric, results_of
 from dearig.model.fitting.estimates import MOVES_MAX, BetterPoint
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Estimate
@@ -46,6 +48,7 @@ from dearig.model.verdict import (
 
 __all__ = ["Conclusion", "conclude", "unnamed_of"]
 
+_LEADING = 5  # families whose evidence is given by channel
 _ITERATIONS = 60  # of the last fits, on every sample: all that have a valley to end in end before
 
 
@@ -138,7 +141,9 @@ class Conclusion:
             (other,) = fresh
             family = family_of(other)
             behind = self.judge.gain(fit, best)
-            near = behind < self.judge.settings.alike or fit.cost - best.cost < self._form()
+            near = behind < self.judge.settings.alike or (
+                fit.cost - best.cost < self._form() and not self.judge.demanded(fit, best)
+            )
             if family != family_of(member) and near and behind < taken.get(family, (math.inf,))[0]:
                 taken[family] = (behind, other, fit)
         return [(other, fit) for _, other, fit in sorted(taken.values(), key=lambda t: t[0])]
@@ -194,6 +199,31 @@ class Conclusion:
         kept = tuple(e for e in careful.model.effects if e[0] not in once)
         return replace(careful.model, effects=kept)
 
+    def channels(self) -> tuple[ChannelResult, ...]:
+        """Return the electrical channels, with what the first and the last model leave of them."""
+        channels, first, last = self.fitter.channels, self.first.model, self.last.model
+        if channels is None or not (isinstance(first, Actuator) and isinstance(last, Actuator)):
+            return ()
+        return results_of(channels, first, last)
+
+    def channel_evidence(self) -> tuple[tuple[str, tuple[tuple[str, float], ...]], ...]:
+        """Return, of the best fit of each leading family, what each channel says for it."""
+        evidence, judge = self.judge.channels, self.judge
+        if evidence is None:
+            return ()
+        best: dict[str, Fit] = {}
+        for fit in judge.ranked(f for f in self.found.fits.values() if f.members):
+            best.setdefault(" + ".join(sorted(set(map(family_of, fit.members)))), fit)
+        found = []
+        for family, fit in list(best.items())[:_LEADING]:
+            if isinstance(fit.model, Actuator):
+                moved = judge.of_displacement(self.found.baseline).criterion
+                moved -= judge.of_displacement(fit).criterion
+                said = evidence.of(fit.model)
+                odds = (("displacement", moved), *((n, -value) for n, value in said.items()))
+                found.append((family, odds))
+        return tuple(found)
+
     def steps(self, final: Stage) -> tuple[list[Step], list[tuple[str, Actuator | Strip]]]:
         """Return the steps with their evidence, and the rivals by family."""
         best, steps, rivals = self.found.best, [], []
@@ -232,6 +262,10 @@ class Conclusion:
                     self.fitter.raw,
                     for_others=self.predicting(with_it, with_it),
                 )
+            says: tuple[ChannelSays, ...] = ()
+            evidence, last = self.judge.channels, self.last.model
+            if evidence is not None and isinstance(last, Actuator) and is_electric(name):
+                says = evidence.says(last, name)
             families = tuple(dict.fromkeys(family_of(other) for other, _ in alike))
             steps.append(
                 Step(
@@ -241,9 +275,10 @@ class Conclusion:
                     stage,
                     own,
                     families,
-                    tuple(said),
+                    (*said, *(s.text for s in says)),
                     (("criterion_without", worth),),
                     nearest[0] if nearest else "",
+                    says,
                 )
             )
         return steps, rivals
@@ -300,6 +335,9 @@ def conclude(
         status=found.status,
         families=_families(end, judge.probabilities(fits, found.sought)),
         marginals=_families(end, judge.marginals(fits, found.sought)),
+        channels=end.channels(),
+        channel_evidence=end.channel_evidence(),
+        denials=found.denials,
     )
 
 
@@ -396,6 +434,7 @@ def _notes(
             "it linear: half a sample of delay, not an effect of the rig"
         )
     said += _own_delays(end)
+    said += [denial.text for denial in end.found.denials]
     if sums:
         said.append(sums_text(sums))
     if end.is_small and not all(getattr(s, "is_noise", True) for s in after):

@@ -8,15 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dearig.model.diagnosis.channels import Denial
 from dearig.model.diagnosis.evidence import Judge, family_of
-from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
+from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter, with_effect
 from dearig.model.diagnosis.preparation import has_line_at_rest
 from dearig.model.diagnosis.race import RaceEntry, race
 from dearig.model.diagnosis.regression import Regression, Start, is_unseen
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS, Effect
+from dearig.model.fitting.channels import JointProblem, is_electric
 from dearig.model.readings.environment import recorded_of
 from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation.actuator import Actuator
 
 __all__ = ["Race", "Search", "SearchResult"]
 
@@ -53,7 +56,8 @@ class SearchResult:
     """End of a search: the baseline, the best fit, all others by their members, and the races.
 
     ``sought`` are the families of effects that the search knows. ``status`` is ``complete``,
-    ``stopped`` or ``budget``.
+    ``stopped`` or ``budget``. ``denials`` are of effects that would explain the displacement as
+    well as any, and that an electrical channel denies.
     """
 
     baseline: Fit
@@ -63,6 +67,7 @@ class SearchResult:
     judge: Judge
     sought: frozenset[str]
     status: str
+    denials: tuple[Denial, ...] = ()
 
 
 class Search:
@@ -80,6 +85,8 @@ class Search:
         self.progress, self.stop, self.log = progress, stop, log
         self.fits: dict[frozenset[str], Fit] = {}
         self.races: list[Race] = []
+        # of each effect that a channel denies: what the regression leaves with it, and the denial
+        self._denials: dict[str, tuple[float, Denial]] = {}
         self._left_out: set[tuple[frozenset[str], str]] = set()
         self._searching, self._done = False, 0.0
         self._at_rest = ""  # the effect that the readings at rest have shown
@@ -107,7 +114,7 @@ class Search:
     def run(self) -> SearchResult:
         """Return what the records lack, or the best of what the work or the operator allowed."""
         baseline = self.keep(self.fitter.baseline(self._of_baseline))
-        self.judge = Judge(self.settings, baseline)
+        self.judge = Judge(self.settings, baseline, self.fitter.channels)
         self.log(f"baseline {baseline.cost:.4g}, effort {self.fitter.work.effort:.2e}")
         self._searching, status = True, "complete"
         try:
@@ -124,7 +131,16 @@ class Search:
         if self.fitter.of_actuator:
             sought.add(family_of(DRIFT))
         races = tuple(self.races)
-        return SearchResult(baseline, best, self.fits, races, self.judge, frozenset(sought), status)
+        return SearchResult(
+            baseline, best, self.fits, races, self.judge, frozenset(sought), status, self._denied()
+        )
+
+    def _denied(self) -> tuple[Denial, ...]:
+        """Return the denials of effects whose start explains the displacement as well as any."""
+        least = min((m for race in self.races for m in race.starts.values()), default=math.inf)
+        near = self.settings.noise_margin * least
+        found = sorted((m, name) for name, (m, _) in self._denials.items() if m < near)
+        return tuple(self._denials[name][1] for _, name in found)
 
     def _of_baseline(self, stage: str, fraction: float) -> None:
         # searches with and without stiffening springs each count from 0 to 1
@@ -256,6 +272,7 @@ class Search:
             least = self.judge.ranked(smaller)[0]
             explained = self.judge.base_cost - least.cost
             form = least.cost - best.cost < self.settings.form_share * explained
+            form = form and not self.judge.demanded(least, best)
             if not (form and self.judge.is_noise(least)) and (
                 self.judge.gain(least, best) > self.settings.odds
             ):
@@ -341,9 +358,24 @@ class Search:
     def _run(self, parent: Fit, starts: Mapping[str, list[Start]]) -> list[Fit]:
         """Return the fits that came through one race, and keep them: the next may be the last."""
         candidates = [
-            RaceEntry(name, tuple(some), is_unseen(EFFECTS[name])) for name, some in starts.items()
+            RaceEntry(
+                name, tuple(some), is_unseen(EFFECTS[name]), self._of_channels(parent, name, some)
+            )
+            for name, some in starts.items()
         ]
         return [self.keep(fit) for fit in race(self.fitter, self.judge, parent, candidates)]
+
+    def _of_channels(self, parent: Fit, name: str, starts: Sequence[Start]) -> float:
+        """Return what the electrical channels add to the criterion at the best of ``starts``."""
+        evidence, model = self.judge.channels, with_effect(parent.model, name, starts[0].values)
+        if evidence is None or not (is_electric(name) and isinstance(model, Actuator)):
+            return 0.0
+        before = parent.model
+        already = evidence.total(before) if isinstance(before, Actuator) else 0.0
+        denial = evidence.denial(name, model)
+        if denial is not None:
+            self._denials.setdefault(name, (starts[0].misfit, denial))
+        return evidence.total(model) - already
 
     def _regression(self, parent: Fit) -> tuple[Regression, Extent]:
         fitter, records = self.fitter, self.fitter.records
@@ -351,7 +383,7 @@ class Search:
         if parent.drift:
             noise = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
             went = parent.mean_drift() * noise
-        plain = fitter.problem(parent.model)
+        plain = JointProblem.alone(fitter.problem(parent.model))
         residuals = -parent.plain_residuals()
         regression = Regression(
             records,

@@ -3,9 +3,10 @@
     C = n ln(c + delta^2 (c0 - c)) + k ln n + log det(drift)            (8)
 
 c is the mean square of the whitened residuals over the noise, c0 that of the baseline, k the number
-of fitted parameters. No law is true to more than delta of what it explains. n counts independent
-samples: the readings over the least correlation time of any fit so far, one n for the whole
-diagnosis. (Schwarz, Annals of Statistics 6, 461 (1978); the scale of the noise is marginalised.)
+of fitted parameters. No law is true to more than delta of what it explains. Electrical channels add
+a term each, (12). n counts independent samples: the readings over the least correlation time of any
+fit so far, one n for the whole diagnosis. (Schwarz, Annals of Statistics 6, 461 (1978); the scale
+of the noise is marginalised.)
 Numbers of equations are those of ``app/docs/explanation/diagnosis.md``.
 """
 
@@ -13,18 +14,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dearig.model.diagnosis.channels import ChannelEvidence
 from dearig.model.diagnosis.fits import DRIFT, Fit
 from dearig.model.diagnosis.preparation import at_rest
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
+from dearig.model.fitting.channels import Channels
 from dearig.model.fitting.intervals import correlation_time, has_spectrum_of, is_flat
+from dearig.model.simulation.actuator import Actuator
 
 __all__ = ["Evidence", "Judge", "family_of"]
 
+#: Twice the logarithm of odds that nothing outweighs: of an effect that a recorded channel denies.
+_DENIED = 1e6
 _REST_MIN = 100  # readings: fewer do not show whether the noise is white
 
 
@@ -60,17 +66,25 @@ class Evidence:
 class Judge:
     """Compares fits to the same records; ``see`` it every fit that may count."""
 
-    def __init__(self, settings: DiagnosisSettings, baseline: Fit) -> None:
+    def __init__(
+        self, settings: DiagnosisSettings, baseline: Fit, channels: Channels | None = None
+    ) -> None:
         self.settings = settings
         self.readings = baseline.problem.samples
         self.base_cost = baseline.cost
         self._correlation = max(1.0, baseline.correlation)
         self._rest = _coloured_rest(baseline) if self._sensed(baseline) else ()
+        #: what the electrical channels say; None where none is used
+        self.channels: ChannelEvidence | None = None
+        if channels and isinstance(baseline.model, Actuator):
+            self.channels = ChannelEvidence(channels, settings, baseline.model)
 
     def see(self, fits: Iterable[Fit]) -> None:
         """Take account of the correlation times of ``fits``."""
         for fit in fits:
             self._correlation = max(1.0, min(self._correlation, fit.correlation))
+            if self.channels and isinstance(fit.model, Actuator):
+                self.channels.see(fit.model)
 
     @property
     def samples(self) -> float:
@@ -78,7 +92,12 @@ class Judge:
         return self.readings / self._correlation
 
     def evidence(self, fit: Fit) -> Evidence:
-        """Return the evidence for ``fit``."""
+        """Return the evidence for ``fit``, that of electrical channels included."""
+        own = self.of_displacement(fit)
+        return replace(own, misfit=own.misfit + self._of_channels(fit))
+
+    def of_displacement(self, fit: Fit) -> Evidence:
+        """Return the evidence for ``fit`` from the displacement alone."""
         s, n = self.settings, self.samples
         loss = fit.cost + s.form_error**2 * max(self.base_cost - fit.cost, 0.0)
         drift = fit.problem.noise_drift
@@ -86,6 +105,22 @@ class Judge:
             n * math.log(max(loss, 1e-12)),
             fit.free * math.log(max(n, 2.0)) + (drift.log_det if drift else 0.0),
         )
+
+    def _of_channels(self, fit: Fit) -> float:
+        """Return what the electrical channels add to C; much where one denies an effect."""
+        if self.channels is None or not isinstance(fit.model, Actuator):
+            return 0.0
+        veto = _DENIED if self.channels.denied(fit.model) else 0.0
+        return self.channels.total(fit.model) + veto
+
+    def demanded(self, parent: Fit, fit: Fit) -> bool:
+        """Whether an electrical channel supports ``fit`` over ``parent`` decisively."""
+        if self.channels is None:
+            return False
+        before, after = parent.model, fit.model
+        if not (isinstance(before, Actuator) and isinstance(after, Actuator)):
+            return False
+        return self.channels.demands(before, after)
 
     def criterion(self, fit: Fit) -> float:
         """Return C; the smallest is the most probable."""
@@ -114,6 +149,8 @@ class Judge:
             return False
         if not self._sensed(fit):
             return True
+        if self.channels and isinstance(fit.model, Actuator) and self.channels.is_open(fit.model):
+            return False
         if fit.has_fastest_branch:
             return False
         return self._is_like_rest(fit) or fit.cost - 1.0 < self.settings.form_share * (
@@ -141,7 +178,8 @@ class Judge:
         s = self.settings
         left = max(parent.cost - 1.0, 1e-9)
         enough = not parent.members or (parent.cost - fit.cost) / left > s.share
-        return self.gain(parent, fit) > s.odds and parent.cost - fit.cost > s.form_error and enough
+        explains = parent.cost - fit.cost > s.form_error and enough
+        return self.gain(parent, fit) > s.odds and (explains or self.demanded(parent, fit))
 
     def probabilities(self, fits: Sequence[Fit], sought: Iterable[str] = ()) -> dict[str, float]:
         """Return the share of each family in the probability of what is missing; they add up to 1.

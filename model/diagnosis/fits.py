@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from dearig.model.diagnosis.preparation import (
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting.broyden import descend_broyden
+from dearig.model.fitting.channels import Channels, JointProblem
 from dearig.model.fitting.coarse_drive import coarse_drive_of
 from dearig.model.fitting.estimates import recentre
 from dearig.model.fitting.identify import fit_globally, is_worth_freeing
@@ -64,8 +66,9 @@ _TO_THE_END = 200  # iterations, enough for the valley of two branches of nearly
 class Fit:
     """A model fitted to the records: coordinates ``x`` (d,) in the layout of ``problem``.
 
-    ``fixed`` (d,) bool were held. ``cost`` is the mean square of the whitened residuals (N,), in
-    units of the noise; ``jacobian`` (N, f) is one near ``x``, or not finite.
+    ``fixed`` (d,) bool were held. ``cost`` is the mean square of the whitened residuals (N,) of the
+    displacement, in units of the noise; ``jacobian`` (N, f) is one near ``x``, or not finite. It
+    has further rows where electrical channels take part in the fit.
     """
 
     problem: WhitenedProblem
@@ -222,6 +225,8 @@ class Fitter:
         self._space: dict[bool, DriftSpace] = {}
         self._pink_density = 0.0
         self._limits = np.zeros(0, dtype=bool)
+        #: electrical channels that count in fits, known once a baseline is
+        self.channels: Channels | None = None
 
     # -- problems: records as the search reads them
 
@@ -285,6 +290,9 @@ class Fitter:
         _, self.records = self._cleaned(self.records, model, kernel.QUICK)
         self.raw, self.full = self._cleaned(self.raw, model, kernel.CAREFUL)
         self.read_colour()
+        if isinstance(model, Actuator):
+            rigs = [r for r in self._measured if isinstance(r, ActuatorRecord)]
+            self.channels = Channels([r.electric for r in rigs], model)
 
     def _cleaned(
         self, records: Sequence[Record], model: Actuator | Strip, fidelity: int
@@ -329,14 +337,16 @@ class Fitter:
         Relaxation times are those of the search unless a ``layout`` is given.
         """
         layout = layout or FitLayout(model, self.times if self.of_actuator else None)
-        problem = WhitenedProblem(
-            self.full if full else self.records,
-            layout,
-            self.space(full).drift(drift) if self.of_actuator else None,
-            workers=self.workers,
-            fidelity=fidelity,
-            on_simulations=self._count,
-        )
+        records = self.full if full else self.records
+        noise = self.space(full).drift(drift) if self.of_actuator else None
+        how: dict[str, Any] = {
+            "workers": self.workers, "fidelity": fidelity, "on_simulations": self._count
+        }  # fmt: skip
+        channels = self.channels
+        if channels is not None and channels.concern(name for name, _ in model.effects):
+            problem: WhitenedProblem = JointProblem(records, layout, noise, channels, **how)
+        else:
+            problem = WhitenedProblem(records, layout, noise, **how)
         if not full:
             problem.coarse_columns = self._coarse_columns(problem)
         return problem
@@ -564,4 +574,9 @@ def gain_that_ends(fit: Fit, part: float = _GAIN_PART) -> float:
 
 def fit_of(problem: WhitenedProblem, fixed: np.ndarray, found: LocalFit) -> Fit:
     """Return what a descent has ``found`` for ``problem``, with parameters ``fixed`` (d,)."""
+    if isinstance(problem, JointProblem):
+        readings, rows = np.split(found.residuals, problem.edges[-1:])
+        left = found.cost * problem.samples - float(rows @ rows)
+        cost = left / problem.readings_fitted
+        return Fit(problem, found.x, fixed, cost, readings, found.jacobian)
     return Fit(problem, found.x, fixed, found.cost, found.residuals, found.jacobian)

@@ -6,6 +6,7 @@ run abreast: with springs anew and with the parent's.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,6 +22,7 @@ from dearig.model.effects import EFFECTS
 
 __all__ = ["RaceEntry", "race"]
 
+_MOST = 100.0  # of the logarithm of a misfit: no candidate is worse
 _TINY = 1e-3  # of the typical amplitude: an effect that hardly acts, and has a derivative
 
 
@@ -29,22 +31,26 @@ class RaceEntry:
     """An effect that is added to a parent, and the starts of their fit, best first.
 
     One that is ``certain`` enters in any case: the regression does not see what it explains.
+    ``channels`` is what the electrical channels add to the criterion at the best start.
     """
 
     effect: str
     starts: tuple[Start, ...]
     certain: bool = False
+    channels: float = 0.0
 
-    @property
-    def misfit(self) -> float:
-        """What the regression leaves from the best start."""
-        return self.starts[0].misfit
+    def misfit(self, samples: float) -> float:
+        """Return what the regression leaves from the best start, with the channels' evidence.
+
+        The criterion of ``samples`` independent readings is 2 n ln(misfit).
+        """
+        return self.starts[0].misfit * math.exp(min(0.5 * self.channels / samples, _MOST))
 
 
 def race(fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[RaceEntry]) -> list[Fit]:
     """Return the fits of the candidates that came through the race, the most probable first."""
     rungs = fitter.settings.rungs
-    ranked = sorted(candidates, key=lambda c: c.misfit)
+    ranked = sorted(candidates, key=lambda c: c.misfit(judge.samples))
     seen = [c for c in ranked if not c.certain]
     entered = [*(c for c in ranked if c.certain), *seen[: rungs[0].effects]]
     first = fitter.map(lambda c: _entered(fitter, parent, c, rungs[0].iterations), entered)

@@ -9,8 +9,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from dearig.model.diagnosis.channels import ChannelSays, Denial
 from dearig.model.effects import EFFECTS, Curve
 from dearig.model.fitting import Contribution, Estimate
+from dearig.model.fitting.channels import ChannelResult
 from dearig.model.residual import MissingStress, Signature, Unnamed
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
@@ -106,6 +108,7 @@ class Step:
     effect's parameters with 95 % intervals in the final model. ``indistinguishable_from`` names
     the families that explain these data as well. ``evidence`` are sentences for and against.
     ``nearest`` is the best law with a name where the effect is the general law of its family.
+    ``says`` is what each electrical channel says of the effect.
     """
 
     effect: str
@@ -117,6 +120,7 @@ class Step:
     evidence: tuple[str, ...]
     numbers: tuple[tuple[str, float], ...] = ()
     nearest: str = ""
+    says: tuple[ChannelSays, ...] = ()
 
     @property
     def curve(self) -> Curve | None:
@@ -137,7 +141,10 @@ class Diagnosis:
     ``budget`` (the search took the work that it may). ``families`` are the probabilities of the
     families, of ``none`` and of ``unknown``, largest first, which add up to 1: several that
     are missing together share theirs. ``marginals`` are the probabilities that each is among what
-    is missing, which do not add up to 1.
+    is missing, which do not add up to 1. ``channels`` are the electrical channels, used or not.
+    ``channel_evidence`` is, of the leading families, twice the logarithm of the odds that each
+    channel gives to the family's best fit over the baseline: (family, ((channel, odds), ...)).
+    ``denials`` are effects that would explain the displacement, and that a channel denies.
     """
 
     verdict: str
@@ -158,3 +165,6 @@ class Diagnosis:
     status: str = "complete"
     families: tuple[tuple[str, float], ...] = ()
     marginals: tuple[tuple[str, float], ...] = ()
+    channels: tuple[ChannelResult, ...] = ()
+    channel_evidence: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = ()
+    denials: tuple[Denial, ...] = ()

@@ -99,7 +99,14 @@ def _with_held_voltage(records: Sequence[Record]) -> list[Record] | None:
     known = [r for r in records if isinstance(r, ActuatorRecord) and not r.drive.hold]
     if len(known) < len(records):
         return None
-    return [replace(r, drive=replace(r.drive, hold=True)) for r in known]
+    return [
+        replace(
+            r,
+            drive=replace(r.drive, hold=True),
+            electric=None if r.electric is None else r.electric.held(),
+        )
+        for r in known
+    ]
 
 
 def _may_be_held(found: SearchResult, search: Search, as_held: Sequence[Record]) -> bool:

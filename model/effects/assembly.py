@@ -21,6 +21,7 @@ from dearig.model.effects.hooks import FASTEST, HOOKS
 from dearig.model.effects.registry import EFFECTS, PLACES
 
 __all__ = [
+    "AMPLIFIER",
     "HOOKS",
     "HOOK_BITS",
     "HYSTERETIC",
@@ -28,7 +29,10 @@ __all__ = [
     "active_sensors",
     "at_rest",
     "breathe",
+    "charge",
     "commit",
+    "conduct",
+    "drop",
     "inertia",
     "measured_stress",
     "permittivity",
@@ -166,6 +170,10 @@ _OF_EFFECT = _bits()
 HOOK_BITS = MappingProxyType({h: _mask(n for n in EFFECTS if _has(n, h)) for h in HOOKS})
 #: Bits of the hysteretic effects.
 HYSTERETIC = _mask(n for n, effect in EFFECTS.items() if effect.is_hysteretic)
+#: Bits of the effects of the amplifier, whose output its voltage monitor reads.
+AMPLIFIER = _mask(
+    n for n, effect in EFFECTS.items() if effect.acts_on == "amplifier" and _has(n, "supply")
+)
 
 _hooks: Any = generated_module("dearig.model.effects.assembled_hooks", _text())
 _Hook = Callable[..., Any]
@@ -176,6 +184,9 @@ inertia: _Hook = _hooks.inertia
 supply: _Hook = _hooks.supply
 polarise: _Hook = _hooks.polarise
 permittivity: _Hook = _hooks.permittivity
+charge: _Hook = _hooks.charge
+conduct: _Hook = _hooks.conduct
+drop: _Hook = _hooks.drop
 soften: _Hook = _hooks.soften
 stress: _Hook = _hooks.stress
 stiffness: _Hook = _hooks.stiffness

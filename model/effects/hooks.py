@@ -50,7 +50,16 @@ class Hook(NamedTuple):
 #:   ``h`` = 0 it returns the voltage now, and changes no state.
 #: * ``polarise`` V^2, V^2: what a slow dielectric adds to the voltage squared at ``start`` and
 #:   ``end``; state and ``h`` = 0 as in ``supply``.
-#: * ``permittivity``: factor on the Maxwell stress.
+#: * ``permittivity``: factor on the Maxwell stress, and on the charge.
+#: * ``charge`` V: what the effect adds to the voltage ``voltage`` at the film in the charge
+#:   Q = C (V + ...), beside its ``polarise`` and ``permittivity``. From these the charge follows
+#:   without a hook, since the Maxwell stress is D E: Q = C V_E^2/V. Needed only where the charge is
+#:   another mean over the film than the force.
+#: * ``conduct`` A: the current that the film or its frame conducts at ``voltage`` V, where it
+#:   follows from the parameters.
+#: * ``drop`` V: the part of the supplied voltage that a conducted current drops in series with the
+#:   film at ``voltage`` V, where the resistance in series is not known: the current is that
+#:   over the resistance, which a record of the current tells.
 #: * ``soften``: factor on the network's nominal stress.
 #: * ``stress`` Pa: added to the network's nominal stress, positive where it pulls the film together
 #:   (a drag is positive while the film grows), at ``lam`` and ``rate``. It is called several times
@@ -71,6 +80,9 @@ HOOKS: Mapping[str, Hook] = MappingProxyType(
         "supply": Hook("t, start, end, h, lam, rate", "start, end"),
         "polarise": Hook("start, end, h", "sums"),
         "permittivity": Hook("lam, field2", "product"),
+        "charge": Hook("voltage", "sum"),
+        "conduct": Hook("t, voltage, lam", "sum"),
+        "drop": Hook("voltage", "sum"),
         "soften": Hook("lam, since, t, warmth", "product"),
         "stress": Hook("lam, rate, lam0, since, t", "sum"),
         "stiffness": Hook("lam, rate", "sums"),

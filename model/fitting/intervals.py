@@ -251,8 +251,9 @@ def _path(
     first, second = np.zeros(layout.size), np.zeros(layout.size)
     first[index] = 1.0
     sides = np.clip(best + np.outer((-probe, probe), first), layout.lower, layout.upper)
-    predicted, _ = problem.predict(layout.values(sides))
-    slope = np.diff(predicted / problem.sigma, axis=0)[0] / max(np.ptp(sides[:, index]), 1e-300)
+    slope = np.diff(problem.scaled(layout.values(sides)), axis=0)[0] / max(
+        np.ptp(sides[:, index]), 1e-300
+    )
     first[others] = -inverse @ (j.T @ slope)
     left = slope + j @ first[others]
     sigma = 1.0 / max(math.sqrt(float(left @ left)), 1e-150)
@@ -260,8 +261,7 @@ def _path(
     probe = min(0.1 * sigma, *(0.05 * layout.reach(best) / np.maximum(np.abs(first), 1e-300)))
     three = best + np.outer((-probe, 0.0, probe), first)
     if np.all((three >= layout.lower) & (three <= layout.upper)):
-        predicted, _ = problem.predict(layout.values(three))
-        bend = np.diff(predicted / problem.sigma, 2, axis=0)[0] / probe**2
+        bend = np.diff(problem.scaled(layout.values(three)), 2, axis=0)[0] / probe**2
         second[others] = -inverse @ (j.T @ bend)
     return _Path(index, best, first, second, sigma)
 

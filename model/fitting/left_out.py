@@ -18,7 +18,8 @@ def left_out(residuals: np.ndarray, jacobian: np.ndarray, reach: np.ndarray) -> 
     ``residuals`` (N,) and their ``jacobian`` (N, P) are at the optimum; ``reach`` (P,) is the most
     that a parameter may change. The fit without a segment is the linear one about the optimum:
     exact where the model is linear over the change that a segment makes, and that is small where a
-    segment is one of many.
+    segment is one of many. Rows of the ``jacobian`` beyond the N-th are of other data, which are
+    never left out.
     """
     edges = np.linspace(0, residuals.size, _SEGMENTS + 1).astype(int)
     out = residuals.copy()

@@ -154,8 +154,7 @@ def _bend(
     probes[:, free] += _PROBE * steps
     inside = np.all((probes >= layout.lower) & (probes <= layout.upper), axis=1)
     probes = np.clip(probes, layout.lower, layout.upper)
-    predicted, _ = problem.predict(layout.values(probes))
-    shifted = (predicted - problem.measured) / problem.sigma
+    _, shifted = problem.evaluate(probes)
     second = 2.0 / _PROBE * ((shifted - r) / _PROBE - steps @ jac.T)
     push = (second @ jac)[:, move] / safe[move]
     bend = np.zeros_like(steps)

@@ -202,6 +202,10 @@ class Problem:
         moved, status, steps = readings_of(c, length, drive, record.lag, fidelity, record.time)
         return record.seen(moved), status, steps
 
+    def scaled(self, values: np.ndarray) -> np.ndarray:
+        """Return predictions (P, N) over the noise of a population ``values`` (P, d), natural."""
+        return self.predict(values)[0] / self.sigma
+
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Return (model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
         predicted, _ = self.predict(self.layout.values(x))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dearig.model.errors import ModelError
+from dearig.model.readings.channels import ElectricRecord
 from dearig.model.simulation.actuator import Drive
 
 __all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "interpolated"]
@@ -38,7 +39,9 @@ class ActuatorRecord:
     its time. ``coarse_drive``, where there is one, is the drive in fewer and longer steps
     (``dearig.model.fitting.coarse_drive``); the effect of a parameter is estimated with it.
     ``rounding`` m is the part of ``noise`` that is the step of coarse readings: neighbours are
-    rounded alike, so that their mean keeps it.
+    rounded alike, so that their mean keeps it. ``electric`` are the readings of the voltage monitor
+    and the current of every sample; they stay as they are where the record is thinned. None where a
+    recording has none.
     """
 
     name: str
@@ -52,6 +55,7 @@ class ActuatorRecord:
     lag_error: float = 0.0
     coarse_drive: Drive | None = None
     rounding: float = 0.0
+    electric: ElectricRecord | None = None
 
     def __post_init__(self) -> None:
         _check(self.name, self.measured, self.drive.time, self.noise)

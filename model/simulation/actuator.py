@@ -9,6 +9,7 @@ import numpy as np
 
 from dearig.model import coefficients as at
 from dearig.model import kernel
+from dearig.model.circuit import loop as circuit
 from dearig.model.effects import (
     EFFECTS,
     MEMORY,
@@ -112,6 +113,10 @@ class Response:
 
     ``stretch`` lam, ``rate`` dlam/dt in 1/s, ``displacement`` in m what the sensor reads, which is
     (lam - lam_rest) L1 unless an effect acts on it, ``field`` the true field phi/z in V/m.
+    ``output`` V is the amplifier's, ``film_voltage`` V that at the film, each as a mean over the
+    interval that a sample begins, and ``current`` A the mean that the amplifier delivers meanwhile:
+    the change of charge, the jump at the sample included, and what is conducted. A leakage that is
+    given as a loss of voltage says nothing of its current, which is left out.
     ``status`` is one of ``dearig.model.kernel``'s; beyond sample ``reached`` the arrays repeat the
     last stretch that was computed.
     """
@@ -124,6 +129,9 @@ class Response:
     rest_stretch: float
     status: int
     reached: int
+    output: np.ndarray
+    film_voltage: np.ndarray
+    current: np.ndarray
 
     @property
     def ok(self) -> bool:
@@ -199,6 +207,7 @@ class Actuator:
         speed = rate * self.film.length
         at_sensor(drive.time, moved, speed, drive.time - lag, displacement, velocity)
         kernel.read_sensor(c, drive.time, displacement, velocity, np.zeros(SENSOR_MEMORY))
+        electric = circuit.follow(c, drive.time, drive.voltage, drive.ends, drive.air, stretch)
         return Response(
             time=drive.time,
             stretch=stretch,
@@ -208,6 +217,9 @@ class Actuator:
             rest_stretch=rest,
             status=status,
             reached=reached,
+            output=electric[circuit.OUTPUT],
+            film_voltage=electric[circuit.FILM],
+            current=electric[circuit.INTO],
         )
 
 

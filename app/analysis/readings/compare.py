@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,10 @@ from dearig.recording.content.rest_noise import MIN_QUIET
 from dearig.recording.reading.early_end import early_end
 from dearig.recording.reading.origin import origin_of
 from dearig.recording.reading.recording import Recording
+
+if TYPE_CHECKING:
+    # imports SciPy, which a comparison of films does without
+    from dearig.model.fitting.channels import ChannelResult
 
 __all__ = ["compare"]
 
@@ -84,7 +89,18 @@ def compare(
         quiet_count=noise.count if noise and noise.source == LEAD_IN else 0,
         origin=origin_of(recording, hashed),
         step=_converter_step(recording),
+        channels=_channels(readings, model),
     )
+
+
+def _channels(readings: Readings, model: Actuator | Strip) -> tuple[ChannelResult, ...]:
+    """Return what ``model`` leaves of the voltage monitor and the current of ``readings``."""
+    if not isinstance(model, Actuator) or readings.electric is None:
+        return ()
+    from dearig.model.fitting.channels import Channels, results_of
+
+    channels = Channels([readings.electric], model)
+    return results_of(channels, replace(model, effects=()), model)
 
 
 def _film(readings: Readings, model: Actuator | Strip) -> _Predicted:

@@ -9,12 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
+from dearig.analysis.readings.channels import electric_of
 from dearig.analysis.readings.early_ends import choose
 from dearig.analysis.readings.opening import Source, open_all
 from dearig.analysis.readings.quality import Quality, check_driven, driven_by, inspect
 from dearig.analysis.readings.room import moisture_of, warmth_of
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
+from dearig.model.readings.channels import ElectricRecord
 from dearig.model.readings.denoise import reading_noise, smoothed
 from dearig.model.readings.noise import LEAD_IN, require_readings, rest_of_rounded, slow_at_rest
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, interpolated
@@ -128,6 +130,14 @@ class Readings:
         except ModelError as error:
             raise InputError(f"{self.recording.path}: {error}") from error
 
+    @cached_property
+    def electric(self) -> ElectricRecord | None:
+        """The voltage monitor and the current; None for a film, and where neither was recorded."""
+        if self.kind == "film":
+            return None
+        displacement = interpolated(self.recording.time, self.displacement, self.quality.valid)
+        return electric_of(self.recording, self.voltage, displacement, self.drive)
+
     def check_driven(self) -> None:
         """Refuse readings under a drive that never changes, to which nothing can be fitted."""
         check_driven(self.recording, self.moved_by)
@@ -174,6 +184,7 @@ class Readings:
             self.lead_in,
             lag_error=recording.displacement_delay_error,
             rounding=noise.step / math.sqrt(12.0),
+            electric=self.electric,
         )
 
 

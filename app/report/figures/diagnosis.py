@@ -10,7 +10,7 @@ import numpy as np
 
 from dearig.analysis.decimate import decimate
 from dearig.report.figures import style as base
-from dearig.report.figures.defaults import style
+from dearig.report.figures.defaults import style, text_size
 from dearig.report.text.numbers import significant
 from dearig.units import SHOWN, Shown
 
@@ -254,7 +254,7 @@ def bars_figure(
             for row, value in zip(rows, values, strict=True):
                 ax.annotate(
                     significant(float(value)), (value, row + shift), (3, 0),
-                    textcoords="offset points", va="center", fontsize=8.5,
+                    textcoords="offset points", va="center", fontsize=text_size(8.5),
                 )  # fmt: skip
         if noise is not None:
             ax.axvline(
@@ -282,14 +282,14 @@ def _band(ax: Axes, noise: float | None, shown: Shown) -> None:
 
 def _inside(ax: Axes, text: str) -> None:
     """Put words above the axes at the left, clear of the curves."""
-    ax.set_title(text, loc="left", fontsize=9.0, pad=2.5)
+    ax.set_title(text, loc="left", fontsize=text_size(9.0), pad=2.5)
 
 
 def _small_legend(ax: Axes, scale: float = 1.0) -> None:
     ax.legend(
         markerscale=scale,
-        loc="lower right", bbox_to_anchor=(1.02, 1.0), ncols=3, fontsize=8.0, handlelength=1.0,
-        columnspacing=0.7, handletextpad=0.35,
+        loc="lower right", bbox_to_anchor=(1.02, 1.0), ncols=3,
+        fontsize=text_size(8.0), handlelength=1.0, columnspacing=0.7, handletextpad=0.35,
     )  # fmt: skip
 
 

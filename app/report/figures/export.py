@@ -1,4 +1,4 @@
-"""Export of figures: PNG files, and SVG elements for an HTML page."""
+"""Export of figures: files, and SVG elements for an HTML page."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dearig.report.figures.defaults import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["save_png", "svg"]
+__all__ = ["save_for_print", "save_png", "svg"]
 
 
 def save_png(figure: Figure, path: str | Path, dpi: int = 200) -> Path:
@@ -27,6 +27,27 @@ def save_png(figure: Figure, path: str | Path, dpi: int = 200) -> Path:
     with replaced_when_done(path, overwrite=True) as partial:
         partial.write_bytes(picture.getvalue())
     return path
+
+
+def save_for_print(figure: Figure, path: Path, kind: str, title: str, about: str) -> None:
+    """Write ``figure`` as ``kind`` (pdf, svg or png) with a ``title`` and what it is ``about``.
+
+    Fonts of a PDF are TrueType (type 42), and text of an SVG is text. The file has no date.
+    Raises ``InputError``.
+    """
+    from dearig.recording.files import replaced_when_done
+
+    if kind == "pdf":
+        notes = {"Title": title, "Subject": about, "Creator": "dearig", "CreationDate": None}
+    elif kind == "svg":
+        notes = {"Title": title, "Description": about, "Creator": "dearig", "Date": None}
+    else:
+        notes = {"Title": title, "Description": about, "Software": "dearig"}
+    picture = io.BytesIO()
+    with style():
+        figure.savefig(picture, format=kind, metadata=notes)
+    with replaced_when_done(path, overwrite=True) as partial:
+        partial.write_bytes(picture.getvalue())
 
 
 def svg(figure: Figure, prefix: str, label: str) -> str:

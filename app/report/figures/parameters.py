@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 __all__ = ["branches_figure", "parameter_columns", "parameters_figure"]
 
+#: Width in inches from which the legend of parameters has two columns.
+_LEGEND_TWO = 4.0
+
 
 def parameters_figure(fit: Identification) -> Figure:
     """Draw every parameter with its 95 % interval; open ends are arrows, undetermined ones grey.
@@ -56,7 +59,10 @@ def parameters_figure(fit: Identification) -> Figure:
             for handle, name in zip(*ax.get_legend_handles_labels(), strict=True):
                 handles.setdefault(name, handle)
         names = [name for name in _PARAMETER_LABELS if name in handles]
-        figure.legend([handles[name] for name in names], names, loc="outside upper left", ncols=2)
+        beside = 2 if figure.get_size_inches()[0] > _LEGEND_TWO else 1
+        figure.legend(
+            [handles[name] for name in names], names, loc="outside upper left", ncols=beside
+        )
         figure.align_ylabels(axes)
     return figure
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dearig.analysis.decimate import decimate, decimate_path
-from dearig.report.figures.defaults import style
+from dearig.report.figures.defaults import style, text_size
 from dearig.report.figures.style import (
     COLUMNS,
     DRIVE,
@@ -177,7 +177,7 @@ def _validation_bars(ax: Axes, train: Comparison, validation: Sequence[Compariso
         labelled.add(comparison.table)
         ax.annotate(
             significant(float(rms[row])), (length, row), (3, 0), textcoords="offset points",
-            va="center", fontsize=8.5,
+            va="center", fontsize=text_size(8.5),
         )  # fmt: skip
     if floors:
         floor = float(np.median(floors)) * shown.error_factor

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.analysis.decimate import decimate
+from dearig.report.figures.defaults import print_size
 from dearig.report.text.numbers import power_of_ten
 
 if TYPE_CHECKING:
@@ -53,9 +54,11 @@ COLUMNS = 600
 
 
 def blank(width: float, height: float) -> Figure:
-    """Make an empty figure of ``width`` and ``height`` in inches."""
+    """Make an empty figure of ``width`` and ``height`` in inches, or as wide as in print."""
     from dearig.report.figures.notebook_figure import NotebookFigure
 
+    if (size := print_size()) is not None:
+        width, height = size.width, size.scale * height
     return NotebookFigure(figsize=(width, height), layout="constrained")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dearig.batch.trend import Trend
 from dearig.batch.trends import Trends
-from dearig.report.figures.defaults import style
+from dearig.report.figures.defaults import style, text_size
 from dearig.report.figures.style import (
     ERROR,
     MEASURED,
@@ -77,11 +77,13 @@ def life_figure(trends: Trends, trend: Trend) -> Figure:
         for ax, film in zip(axes, shown, strict=False):
             mine = np.flatnonzero(sample.film == film)
             _life(ax, trends, trend, mine)
-            ax.set_title(drawable(model.films[film] or "no name", 14), fontsize=8, pad=2)
+            ax.set_title(
+                drawable(model.films[film] or "no name", 14), fontsize=text_size(8.0), pad=2
+            )
         for ax in axes[len(shown) :]:
             ax.set_visible(False)
-        figure.supxlabel(_axis(trends, trend), fontsize=9)
-        figure.supylabel(drawable(number_name(trend.name), 30), fontsize=9)
+        figure.supxlabel(_axis(trends, trend), fontsize=text_size(9.0))
+        figure.supylabel(drawable(number_name(trend.name), 30), fontsize=text_size(9.0))
     return figure
 
 
@@ -100,7 +102,7 @@ def _life(ax: Axes, trends: Trends, trend: Trend, mine: np.ndarray) -> None:
             ax.axvline(0.5 * (place[k - 1] + place[k]), color=MODEL, lw=1.0, ls="--")
     few_ticks(ax, x=3, y=3)
     ax.ticklabel_format(useOffset=False)
-    ax.tick_params(labelsize=7)
+    ax.tick_params(labelsize=text_size(7.0))
 
 
 def fitted(trend: Trend) -> np.ndarray:

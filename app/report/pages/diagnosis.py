@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
     from dearig.model.residual import MissingStress, Signature
 
-__all__ = ["write_diagnosis_report"]
+__all__ = ["diagnosis_contents", "write_diagnosis_report"]
 
 _Of = TypeVar("_Of", "Signature", "MissingStress")
 
@@ -77,7 +77,8 @@ class DiagnosisPage:
     headline: str
     summary: tuple[str, ...]
     warnings: tuple[str, ...]
-    errors: tuple[tuple[str, tuple[Table, ...]], ...]
+    errors: tuple[Table, ...]
+    thesis_errors: tuple[Table, ...]
     bars: tuple[Picture, ...]
     step_table: Table
     pictures: tuple[Picture, ...]
@@ -100,31 +101,35 @@ class DiagnosisPage:
 
 def write_diagnosis_report(outcome: DiagnoseOutcome, path: str | Path) -> Path:
     """Write the report of a diagnosis to ``path``. Raises ``InputError``."""
-    title = f"Missing effects: {outcome.title}"
+    return write_page(path, "diagnosis.html.j2", diagnosis_contents(outcome), (outcome,))
+
+
+def diagnosis_contents(outcome: DiagnoseOutcome) -> Callable[[], dict[str, Any]]:
+    """Return what makes the values of the page of a diagnosis."""
 
     def contents() -> dict[str, Any]:
         return {
             "d": _page(outcome, prefixes()),
-            "title": title,
+            "title": f"Missing effects: {outcome.title}",
             "lead": "Diagnosis",
             "head": head_of(origins_of((*outcome.after.train, *outcome.after.validation))),
         }
 
-    return write_page(path, "diagnosis.html.j2", contents)
+    return contents
 
 
 def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
     finding, kind = outcome.finding, outcome.kind
     changed = bool(finding.steps)
-    errors = []
+    errors, theirs = [], []
     for heading, before, after in (
         ("Validation recordings", outcome.before.validation, outcome.after.validation),
         ("Training recordings", outcome.before.train, outcome.after.train),
     ):
         if before and after:
-            ours = before_after_table("Measured minus model", before, after, kind)
-            theirs = thesis_before_after_table("By the thesis's formulas", before, after, kind)
-            errors.append((heading, (ours, theirs)))
+            errors.append(before_after_table(heading, before, after, kind))
+            by_thesis = f"{heading}, by the thesis's formulas"
+            theirs.append(thesis_before_after_table(by_thesis, before, after, kind))
     pairs = [
         *_paired(outcome.before.validation, outcome.after.validation),
         *_paired(outcome.before.train, outcome.after.train),
@@ -147,6 +152,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         summary=summary(outcome),
         warnings=warnings(outcome),
         errors=tuple(errors),
+        thesis_errors=tuple(theirs),
         bars=bars,
         step_table=step_table(outcome),
         pictures=_validation_pictures(outcome, changed, names),

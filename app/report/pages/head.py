@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import shlex
-import subprocess
-import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from datetime import datetime
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dearig.command_line import without_secrets
-from dearig.revision import revision, version
+from dearig.report.made import made, made_now
+from dearig.report.text.citation import citation
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import Comparison
@@ -23,7 +17,6 @@ __all__ = [
     "NOT_RECORDED",
     "Head",
     "RecordingLine",
-    "command_line",
     "head_of",
     "origins_of",
     "simulated_text",
@@ -67,25 +60,21 @@ def head_of(origins: Iterable[Origin], rows: Sequence[tuple[str, Sequence[str]]]
     """
     origins = tuple(dict.fromkeys(origins))
     given = {name: tuple(values) for name, values in rows}
+    now, first = made_now(), made()
+    by = first or now
     found: dict[str, tuple[str, ...]] = {
-        "Program": (f"dearig {revision().text(version())}",),
-        "Report made": (datetime.now().astimezone().isoformat(" ", timespec="seconds"),),
-        "Command": (command_line(),),
+        "Program": (by.program,),
+        "Report made": (by.time,),
+        "Command": (by.command,),
         "Film": _distinct(origins, lambda o: o.film),
         "Operator": _distinct(origins, lambda o: o.operator),
         "Rig file (SHA-256)": _distinct(origins, lambda o: o.rig_file),
     }
+    if first is not None:
+        found["Made again"] = (now.time, f"by {now.program}", now.command)
+    found["Cite as"] = citation(by.program)
     lines = tuple(RecordingLine(o.name, _about(o), o.sha256 or "not computed") for o in origins)
     return Head(simulated_text(origins), tuple((found | given).items()), lines)
-
-
-def command_line() -> str:
-    """Return the command line of this process, quoted as a shell reads it."""
-    words = [Path(sys.argv[0]).stem if sys.argv[:1] != [""] else "python"]
-    words += without_secrets(sys.argv[1:])
-    if words[0] == "__main__":
-        words[0] = "dearig"
-    return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)
 
 
 def origins_of(comparisons: Iterable[Comparison]) -> tuple[Origin, ...]:

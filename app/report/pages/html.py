@@ -9,7 +9,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dearig.analysis.outcomes import pooled_over_noise
+from dearig.analysis.outcomes import IdentifyOutcome, pooled_over_noise
 from dearig.printable import printable
 from dearig.report.figures.data import Column, csv_url, figure_columns, to_csv
 from dearig.report.figures.export import svg
@@ -20,9 +20,11 @@ from dearig.report.figures.parameters import (
 )
 from dearig.report.figures.recordings import comparison_figure, loop_figure
 from dearig.report.figures.residual import bin_text, residual_panels
+from dearig.report.made import made, made_now, one_time
 from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.pdf import check_browser, is_pdf, write_pdf
 from dearig.report.pages.seal import POLICY, sealed
+from dearig.report.stored import Outcome, stored, stored_url
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
 from dearig.report.text.sentences import (
     describe_model,
@@ -46,7 +48,7 @@ if TYPE_CHECKING:  # jinja2 and matplotlib are loaded by the command that writes
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from dearig.analysis.outcomes import Comparison, IdentifyOutcome, Published, ValidateOutcome
+    from dearig.analysis.outcomes import Comparison, Published, ValidateOutcome
 
 __all__ = [
     "Picture",
@@ -69,12 +71,34 @@ _CONTENTS_PLACE = "<!-- contents -->"
 
 @dataclass(frozen=True)
 class Picture:
-    """Figure of a page: its drawing, number, caption, and the address that holds its data."""
+    """Figure of a page: its prefix for identifiers, number, caption, and columns of its data.
 
-    svg: Markup
-    number: str
+    ``columns`` is None for the curves as drawn.
+    """
+
+    figure: Figure
+    prefix: str
     caption: str
-    data: str
+    columns: Sequence[Column] | None
+
+    @property
+    def number(self) -> str:
+        """The number of the figure on its page."""
+        return self.prefix.removeprefix("f")
+
+    @property
+    def svg(self) -> Markup:
+        """The drawing."""
+        from markupsafe import Markup
+
+        # matplotlib has escaped all text in the drawing, and the label is an escaped attribute
+        return Markup(svg(self.figure, self.prefix, self.caption))  # noqa: S704
+
+    @property
+    def data(self) -> str:
+        """The address that holds the data as CSV."""
+        columns = figure_columns(self.figure) if self.columns is None else self.columns
+        return csv_url(to_csv(columns))
 
 
 @dataclass(frozen=True)
@@ -94,6 +118,7 @@ class Part:
     summary: tuple[str, ...]
     warnings: tuple[str, ...]
     errors: tuple[Side, ...]
+    overview: tuple[Picture, ...]
     parameters: tuple[Table, ...]
     parameter_pictures: tuple[Picture, ...]
     springs: tuple[Table, ...]
@@ -108,13 +133,12 @@ class Part:
 
 def write_identify_report(outcome: IdentifyOutcome, path: str | Path) -> Path:
     """Write the report of an identification to ``path``. Raises ``InputError``."""
-    compared = (*outcome.train, *outcome.validation)
-    return _write(path, outcome.title, compared, lambda p: (_identify_part(outcome, p),))
+    return write_page(path, "report.html.j2", fits_contents((outcome,)), (outcome,))
 
 
 def write_validate_report(outcome: ValidateOutcome, path: str | Path) -> Path:
     """Write the report of a validation to ``path``. Raises ``InputError``."""
-    return _write(path, outcome.title, outcome.comparisons, lambda p: (_validate_part(outcome, p),))
+    return write_page(path, "report.html.j2", fits_contents((outcome,)), (outcome,))
 
 
 def write_demo_report(
@@ -123,52 +147,67 @@ def write_demo_report(
     """Write an identification and a validation of its model as one page. Raises ``InputError``."""
     if {c.name for c in identify.validation} <= {c.name for c in validate.comparisons}:
         identify = replace(identify, validation=())  # the other half shows them
-    return _write(
-        path,
-        identify.title,
-        (*identify.train, *identify.validation, *validate.comparisons),
-        lambda p: (_identify_part(identify, p), _validate_part(validate, p)),
-    )
+    both = (identify, validate)
+    return write_page(path, "report.html.j2", fits_contents(both), both)
 
 
-def _write(
-    path: str | Path,
-    title: str,
-    compared: Sequence[Comparison],
-    parts: Callable[[Iterator[str]], tuple[Part, ...]],
-) -> Path:
+def fits_contents(
+    outcomes: Sequence[IdentifyOutcome | ValidateOutcome],
+) -> Callable[[], dict[str, Any]]:
+    """Return what makes the values of a page with identifications and validations."""
+
     def contents() -> dict[str, Any]:
-        made = parts(prefixes())
+        names = prefixes()
+        compared: list[Comparison] = []
+        parts = []
+        for outcome in outcomes:
+            if isinstance(outcome, IdentifyOutcome):
+                parts.append(_identify_part(outcome, names))
+                compared += (*outcome.train, *outcome.validation)
+            else:
+                parts.append(_validate_part(outcome, names))
+                compared += outcome.comparisons
         return {
-            "parts": made,
-            "title": title,
-            "lead": " and ".join(p.lead for p in made).capitalize(),
+            "parts": tuple(parts),
+            "title": outcomes[0].title,
+            "lead": " and ".join(p.lead for p in parts).capitalize(),
             "head": head_of(origins_of(compared)),
-            "film": all(p.film for p in made),
-            "rest_length_known": any(p.rest_length_known for p in made),
+            "film": all(p.film for p in parts),
+            "rest_length_known": any(p.rest_length_known for p in parts),
         }
 
-    return write_page(path, "report.html.j2", contents)
+    return contents
 
 
-def write_page(path: str | Path, template: str, contents: Callable[[], dict[str, Any]]) -> Path:
+def write_page(
+    path: str | Path,
+    template: str,
+    contents: Callable[[], dict[str, Any]],
+    outcomes: Sequence[Outcome] = (),
+) -> Path:
     """Write ``template`` with ``contents`` to ``path``. Raises ``InputError``.
 
     ``contents`` returns the values of the template, among them those of every page: ``title``,
     ``lead`` (the kind of the report) and ``head`` (a ``dearig.report.pages.head.Head``). A list of
-    the sections, which are its ``h2`` with an ``id``, is put after the head. A ``path`` that ends
-    in ``.pdf`` gets the page as it is printed.
+    the sections that follow, which are its ``h2`` with an ``id``, is put where the template asks
+    for it. A ``path`` that ends in ``.pdf`` gets the page as it is printed. ``outcomes`` are put
+    into the page, so that it and its figures can be made again from it.
     """
     from dearig.recording.files import check_output, replaced_when_done
+
+    def page() -> str:
+        with one_time():
+            held = stored_url(stored(outcomes, made() or made_now())) if outcomes else ""
+            return _render(template, {**contents(), "stored": held})
 
     path = check_output(path, overwrite=True)  # before seconds are spent on figures
     if is_pdf(path):
         check_browser()
-        return write_pdf(_render(template, contents()), path)
-    page = _render(template, contents())
+        return write_pdf(page(), path)
+    text = page()
     with replaced_when_done(path, overwrite=True) as partial:
         # bytes of a file name that are no text are shown as ?
-        partial.write_text(page, encoding="utf-8", errors="replace", newline="\n")
+        partial.write_text(text, encoding="utf-8", errors="replace", newline="\n")
     return path
 
 
@@ -195,9 +234,10 @@ def _render(template: str, contents: dict[str, Any]) -> str:
 
 
 def _contents_list(page: str) -> str:
-    """Return a list of links to the sections of ``page``; "" where there are few."""
+    """Return a list of links to the sections of ``page`` below it; "" where there are few."""
     # text of others has no such element: the templates escape it
-    found = re.findall(r'<(h[12]) id="([^"]+)">(.*?)</\1>', page, re.DOTALL)
+    below = page.partition(_CONTENTS_PLACE)[2]
+    found = re.findall(r'<(h[12]) id="([^"]+)">(.*?)</\1>', below, re.DOTALL)
     if len(found) < _CONTENTS_MIN:
         return ""
     rows = []
@@ -246,7 +286,8 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
     published = outcome.published_fit if len(outcome.train) == 1 else None
     errors = [_side("Training: recordings that were fitted", outcome.train, published)]
     errors += _validation_sides(outcome.validation, "Validation: recordings that were not fitted")
-    pictures = [("Training", _comparison_pictures(outcome.train, prefixes))]
+    overview, *others = _comparison_pictures(outcome.train, prefixes)
+    pictures = [("Training", tuple(others))] if others else []
     if outcome.validation:
         pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
     parameter_pictures = (
@@ -282,6 +323,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         summary=identify_summary(outcome),
         warnings=warnings_of(outcome),
         errors=tuple(errors),
+        overview=(overview,),
         parameters=(parameter_table(fit),),
         parameter_pictures=parameter_pictures,
         springs=springs,
@@ -307,18 +349,20 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
 
 def _validate_part(outcome: ValidateOutcome, prefixes: Iterator[str]) -> Part:
     worst = max(outcome.comparisons, key=_over_noise)
+    overview, *others = _comparison_pictures(outcome.comparisons, prefixes)
     return Part(
         title=outcome.title,
         lead="Validation",
         summary=validate_summary(outcome),
         warnings=warnings_of(outcome),
         errors=tuple(_validation_sides(outcome.comparisons, "By recording")),
+        overview=(overview,),
         parameters=(),
         parameter_pictures=(),
         springs=(),
         branches=(),
         branch_pictures=(),
-        pictures=(("Recordings", _comparison_pictures(outcome.comparisons, prefixes)),),
+        pictures=(("Recordings", tuple(others)),) if others else (),
         residuals=(
             (
                 f"{worst.name}, where the error is largest",
@@ -359,13 +403,7 @@ def picture(
 
     ``data`` is what is saved as its data, by default the curves as drawn.
     """
-    from markupsafe import Markup
-
-    prefix = next(prefixes)
-    # matplotlib has escaped all text in the drawing, and the label is an escaped attribute
-    drawing = Markup(svg(figure, prefix, caption))  # noqa: S704
-    table = to_csv(figure_columns(figure) if data is None else data)
-    return Picture(drawing, prefix.removeprefix("f"), caption, csv_url(table))
+    return Picture(figure, next(prefixes), caption, data)
 
 
 def _comparison_pictures(

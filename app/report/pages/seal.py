@@ -35,6 +35,8 @@ _ELEMENTS = frozenset(
     strong cite code pre span sub sup ul ol li dl dt dd a details summary table caption thead
     tbody tr th td colgroup col figure figcaption svg defs g path use text tspan clippath rect
     line polyline polygon circle ellipse lineargradient stop marker
+    math mfrac mi mn mo mover mrow mspace msqrt mstyle msub msubsup msup mtable mtd mtext mtr munder
+    munderover
     """.split()  # noqa: SIM905  (a table of words)
 )
 _OPENED = re.compile(r"<(?:/?([A-Za-z][^\s/>]*)|([!?/]))")

@@ -13,7 +13,7 @@ import numpy as np
 
 from dearig.model.compiled.jit import jit
 
-__all__ = ["CROWDED", "HOPS", "REMEMBERED", "behind", "conductivity"]
+__all__ = ["CROWDED", "HOPS", "REMEMBERED", "behind", "conductivity", "dropped"]
 
 #: Values of the exponent that name a law: hopping conduction, space-charge-limited current.
 HOPS, CROWDED = 0.0, -1.0
@@ -104,3 +104,9 @@ def behind(
         m[j + 2], m[j + 3] = _reached(m[j] * eased, growth, exponent, last, lam, guess)
         m[j + 1] = last
     return math.copysign(before, start), math.copysign(m[j + 2], end)
+
+
+@jit
+def dropped(m: np.ndarray, j: int, voltage: float) -> float:
+    """Return the voltage that ``behind`` has lost at the end of its last step, signed as it."""
+    return math.copysign(m[j + 1] - m[j + 2], voltage)

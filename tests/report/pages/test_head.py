@@ -8,7 +8,8 @@ import pytest
 from dearig.analysis.outcomes import Published
 from dearig.recording.reading.origin import Origin
 from dearig.report.as_json import outcome_json
-from dearig.report.pages.head import command_line, head_of
+from dearig.report.made import command_line
+from dearig.report.pages.head import head_of
 from dearig.report.pages.html import write_identify_report
 from dearig.report.text.sentences import identify_summary
 from dearig.report.text.tables import thesis_error_table

@@ -50,7 +50,7 @@ FOREIGN = """
   for (const e of document.querySelectorAll("*"))
     for (const a of e.attributes) {
       if (a.name.startsWith("on")) odd.push(a.name);
-      const away = !/^(#|data:text\\/csv;)/.test(a.value);
+      const away = !/^(#|data:text\\/csv;|data:application\\/json,)/.test(a.value);
       if (/^(xlink:)?href$/.test(a.name) && away) odd.push(a.value);
     }
   const bodies = document.querySelectorAll("main").length;

@@ -11,9 +11,9 @@ from dataclasses import replace
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Law
 from dearig.model.effects.library.electric.leakage import EFFECT as BY_TRAPS
-from dearig.model.effects.shared.conduction import HOPS, behind
+from dearig.model.effects.shared.conduction import HOPS, behind, dropped
 
-__all__ = ["EFFECT", "supply"]
+__all__ = ["EFFECT", "drop", "supply"]
 
 EFFECT = replace(
     BY_TRAPS,
@@ -41,3 +41,8 @@ EFFECT = replace(
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
     return behind(m, j, c[k], c[k + 1], HOPS, start, end, h, lam, 1.0)
+
+
+@jit
+def drop(c, k, m, j, voltage):
+    return dropped(m, j, voltage)

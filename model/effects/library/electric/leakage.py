@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Effect, Law, Parameter
-from dearig.model.effects.shared.conduction import REMEMBERED, behind
+from dearig.model.effects.shared.conduction import REMEMBERED, behind, dropped
 
-__all__ = ["EFFECT", "supply"]
+__all__ = ["EFFECT", "drop", "supply"]
 
 EFFECT = Effect(
     name="leakage",
@@ -66,3 +66,8 @@ EFFECT = Effect(
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
     return behind(m, j, c[k], c[k + 1], c[k + 2], start, end, h, lam, 1.0)
+
+
+@jit
+def drop(c, k, m, j, voltage):
+    return dropped(m, j, voltage)

@@ -20,7 +20,7 @@ from dearig.model.effects.library.electric.electrode_resistance import EFFECT as
 from dearig.model.effects.shared.filters import lagged
 from dearig.model.kinematics import thinning_squared
 
-__all__ = ["EFFECT", "supply"]
+__all__ = ["EFFECT", "charge", "supply"]
 
 _MODES = 3
 _HALVINGS = 50  # of the interval in which a root lies: to the last digit
@@ -80,6 +80,27 @@ def _mode(beta, n):
 
 
 @jit
+def _share(beta, mu2):
+    """Share of the mode with the squared root ``mu2`` in the mean square, and in the mean."""
+    return 2.0 * beta * beta / (mu2 * (mu2 + beta * beta + beta))
+
+
+@jit
+def charge(c, k, m, j, voltage):
+    # the force goes with the mean square of the modes, the charge with their mean
+    beta = (1.0 - c[k + 1]) / c[k + 1]
+    mean, square, left = 0.0, 0.0, 1.0
+    for i in range(_MODES):
+        if m[j + _MODES + i] == 0.0:
+            return 0.0  # before the first step
+        share = left if i == _MODES - 1 else _share(beta, m[j + _MODES + i] ** 2)
+        left -= share
+        mean += share * m[j + i]
+        square += share * m[j + i] ** 2
+    return voltage * (mean / math.copysign(math.sqrt(square), m[j]) - 1.0) if square else 0.0
+
+
+@jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
     # charge as voltage times (Z/z)^2, as where the electrode is one resistance
     held, half = int(c[HELD]), 0.5 * h * rate
@@ -92,9 +113,7 @@ def supply(c, k, m, j, t, start, end, h, lam, rate):
         if m[j + _MODES + i] == 0.0:
             m[j + _MODES + i] = _mode(beta, i)  # once: it is the contact's alone
         mu2 = m[j + _MODES + i] ** 2
-        share = 2.0 * beta * beta / (mu2 * (mu2 + beta * beta + beta))
-        if i == _MODES - 1:
-            share = left
+        share = left if i == _MODES - 1 else _share(beta, mu2)
         left -= share
         before += share * m[j + i] ** 2
         m[j + i] = lagged(m[j + i], first * start, last * end, h, tau / mu2)

@@ -13,9 +13,9 @@ from dataclasses import replace
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Law
 from dearig.model.effects.library.electric.leakage import EFFECT as BY_TRAPS
-from dearig.model.effects.shared.conduction import CROWDED, behind
+from dearig.model.effects.shared.conduction import CROWDED, behind, dropped
 
-__all__ = ["EFFECT", "supply"]
+__all__ = ["EFFECT", "drop", "supply"]
 
 _LOSS, _GROWTH, _ = BY_TRAPS.parameters
 
@@ -54,3 +54,8 @@ EFFECT = replace(
 def supply(c, k, m, j, t, start, end, h, lam, rate):
     # of the conductance V^l lam^(2 l + 2), the field has l powers of lam
     return behind(m, j, c[k], c[k + 1], CROWDED, start, end, h, lam, lam ** (c[k + 1] + 2.0))
+
+
+@jit
+def drop(c, k, m, j, voltage):
+    return dropped(m, j, voltage)

@@ -11,10 +11,10 @@ import math
 from dearig.model.coefficients import AIR_HUMIDITY
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Effect, Law, Parameter
-from dearig.model.effects.shared.conduction import REMEMBERED, behind
+from dearig.model.effects.shared.conduction import REMEMBERED, behind, dropped
 from dearig.model.effects.shared.filters import lagged
 
-__all__ = ["EFFECT", "breathe", "supply"]
+__all__ = ["EFFECT", "breathe", "drop", "supply"]
 
 EFFECT = Effect(
     name="moist leakage",
@@ -73,3 +73,8 @@ def breathe(c, k, m, j, warmth, moisture, h):
 def supply(c, k, m, j, t, start, end, h, lam, rate):
     moister = math.exp(c[k + 1] * (c[AIR_HUMIDITY] + m[j + REMEMBERED]))
     return behind(m, j, c[k], _OHMIC, 1.0, start, end, h, lam, moister)
+
+
+@jit
+def drop(c, k, m, j, voltage):
+    return dropped(m, j, voltage)

@@ -1,0 +1,1 @@
+"""The electric circuit along a given stretch: amplifier, electrodes, film, and their current."""
