@@ -80,8 +80,9 @@ class Comparison:
     without the recording's own drift and ``events``, None where it has none of these. ``ended``
     says how the run ended if it ended early. ``quiet_count`` are the readings at rest that
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
-    ``step`` is the converter step of ``measured``, 0.0 where it is not known. ``channels`` are the
-    electrical channels, with what the plain circuit and the model leave of them.
+    ``step`` is the converter step of ``measured``, 0.0 where it is not known; each reading is the
+    mean of ``average`` conversions. ``channels`` are the electrical channels, with what the plain
+    circuit and the model leave of them.
     """
 
     name: str
@@ -104,6 +105,7 @@ class Comparison:
     quiet_count: int = 0
     origin: Origin | None = None
     step: float = 0.0
+    average: int = 1
     channels: tuple[ChannelResult, ...] = ()
 
     @property
@@ -139,7 +141,11 @@ class Comparison:
             return None
         from dearig.model.fitting.rejection import misfit_p
 
-        return misfit_p(self.measured - self.model, self.measured[: self.quiet_count])
+        return misfit_p(
+            self.measured - self.model,
+            self.measured[: self.quiet_count],
+            averaged=self.average > 1,
+        )
 
     @property
     def steady_rms(self) -> float:
