@@ -97,6 +97,7 @@ class Session(QObject):
     recorded = Signal(Path)
     running_changed = Signal(bool)
     armed_changed = Signal(bool)
+    arming = Signal()  #: the rig is about to be armed: what takes the window long is done now
     study_finished = Signal(object)  #: a ``Study`` has just been saved in the folder
     hold_changed = Signal()  #: another feedback belongs to the sequence
     blocks_changed = Signal()
