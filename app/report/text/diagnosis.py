@@ -185,11 +185,6 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
         if before and after:
             said.append(_error_change(role, before, after, outcome, bool(finding.steps)))
     said += tested_texts(outcome)
-    if not outcome.after.validation:
-        said.append(
-            "No validation recordings were given: the errors do not show how well the model "
-            "predicts other recordings."
-        )
     if outcome.few_data:
         said.append(few_data_text(outcome.few_data))
     said += _sureness(outcome)
