@@ -16,6 +16,12 @@ def instruments(
     The card reports its own model and serial number; those of the others come from the rig file.
     """
     amplifier, laser, card = settings.amplifier, settings.laser, settings.card
+    averaging = []
+    if card.average > 1:
+        averaging = [
+            ("averaging", f"{card.average} conversions a row"),
+            ("conversion rate", f"{card.conversion_rate_Hz:g} Hz"),
+        ]
     found = [
         Instrument(
             "card",
@@ -28,6 +34,7 @@ def instruments(
                 *((f"wiring of {n}", w) for n, w in settings.wiring().items()),
                 ("first conversion", f"{card.first_convert_us:g} us after the tick"),
                 ("conversion interval", f"{card.convert_interval_us:g} us"),
+                *averaging,
                 ("high-voltage enable", card.do_hv_enable or "not wired"),
             ),
         ),

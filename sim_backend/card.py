@@ -12,6 +12,7 @@ from dearig.sim_backend.streams import Streams
 __all__ = ["INPUT_OVERWRITTEN", "Converters"]
 
 INPUT_OVERWRITTEN = -200279  #: DAQmx: samples were overwritten before they were read
+_READER_BUFFER = 4.0  # times the reader's delay that ends a run, as a real card's tasks hold
 RATE_TOO_HIGH = -200077  #: DAQmx: a requested value is not supported
 
 
@@ -55,9 +56,12 @@ class Converters:
         inputs = len(self._channels) - 1
         fastest = 1e3 * min(card.ao_rate_max_kHz, card.ai_rate_max_kHz / inputs)
         if not 0.0 < rate <= fastest:
+            averaged = ""
+            if card.average > 1:
+                averaged = f", card.sample_rate_Hz times card.average = {card.average},"
             raise RigError(
-                f"card {card.device}: a sample rate of {rate:g} Hz on {inputs} inputs is not "
-                f"possible; choose up to {fastest:g} Hz",
+                f"card {card.device}: a sample rate of {rate:g} Hz{averaged} on {inputs} inputs is "
+                f"not possible; choose up to {fastest:g} Hz",
                 RATE_TOO_HIGH,
             )
         scan = self._settings.skew(inputs - 1) * 1e6 + card.convert_interval_us
@@ -79,9 +83,11 @@ class Converters:
         """Return counts (N,) int16 for ``volts`` (N,) at the input of ``channel``, saturated."""
         return self._converters[channel].counts(volts)
 
-    def check_buffer(self, waiting: int) -> None:
+    def check_buffer(self, waiting: int, rate: float) -> None:
         """Raise ``RigError`` where more samples are unread than the input buffer holds."""
-        size = self._settings.card.ai_buffer_samples
+        settings = self._settings
+        late = round(_READER_BUFFER * settings.interlocks.late_s * rate)
+        size = max(settings.card.ai_buffer_samples, late)
         if waiting > size:
             raise RigError(
                 f"card {self._settings.card.device}: {waiting} samples waited for their reader and "

@@ -149,7 +149,7 @@ def _at_zero(
 ) -> tuple[float, dict[str, float]]:
     """Return the sample rate in Hz and the means of ``channels`` in SI units at 0 V output."""
     limits = settings.limits.gate_limits()
-    rate = float(settings.card.sample_rate_Hz)
+    rate = float(settings.card.conversion_rate_Hz)
     zero = np.zeros(max(_SAMPLES_MIN, round(_SECONDS * rate)))
     # any film's limits admit 0 V
     prediction = FilmForecast(np.full(zero.size, 1.0 / film.thickness), film.electric_volume)
@@ -169,7 +169,7 @@ def _at_zero(
 def _card(settings: RigSettings, identity: RigIdentity, rate: float) -> Iterator[Finding]:
     name = settings.card.model
     yield Finding(name, "type", f"simulated, at {identity.address}")
-    yield Finding(name, "sample rate", f"{rate:.6g} Hz", f"{settings.card.sample_rate_Hz:g} Hz")
+    yield Finding(name, "sample rate", f"{rate:.6g} Hz", f"{settings.card.conversion_rate_Hz:g} Hz")
     ranges = settings.ranges()
     for channel, terminal in settings.terminals().items():
         yield Finding(name, channel.replace("_", " "), f"{terminal}, +-{ranges[channel]:g} V")

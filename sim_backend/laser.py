@@ -165,7 +165,7 @@ class Laser:
         self._phase = generator.uniform(0.0, self._period)
         self._whole, self._part = divmod(settings.averaging * self._period, interval)
         self._before = generator.standard_normal((int(self._whole) + 1, 2))
-        self._kind = LaserNoise(noise, interval)
+        self._kind = LaserNoise(noise, interval, settings.window)
         self._kind_before = self._kind.start(streams.before_run("laser_noise", run))
 
     def start(self) -> LaserState:

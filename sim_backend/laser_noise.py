@@ -4,7 +4,8 @@
 degrees of freedom. ``pink``: white, and 1/f noise of the same RMS between 0.02 and 40 Hz.
 ``averaged``: normal noise that a filter has averaged over 20 ms, without delaying the reading.
 ``coarse``: white, and the reading in steps of 6 um. ``spikes``: white, and one reading in a
-thousand is 8 to 60 times the noise off. All but ``coarse`` and ``spikes`` and the 1/f part have the
+thousand is 8 to 60 times the noise off. A reading lasts as long as the sensor averages: a faster
+clock samples it several times. All but ``coarse`` and ``spikes`` and the 1/f part have the
 RMS of the settings.
 """
 
@@ -28,14 +29,18 @@ _SPIKE = (8.0, 60.0)  # of the noise
 
 
 class LaserNoise:
-    """Noise of one kind in one run, at one sample every ``interval`` s; see ``NOISES``."""
+    """Noise of one kind in one run, at one sample every ``interval`` s; see ``NOISES``.
 
-    def __init__(self, kind: str, interval: float) -> None:
+    The sensor averages over ``window`` s.
+    """
+
+    def __init__(self, kind: str, interval: float, window: float = 0.0) -> None:
         if kind not in NOISES:
             raise ValueError(f"no noise {kind!r}: choose one of {', '.join(NOISES)}")
         self._kind = kind
         self._left = np.exp(-interval / _PINK_TIMES)
         self._window = max(2, round(_WINDOW / interval))
+        self._repeats = max(1, round(window / interval))  # samples of one reading
 
     def start(self, generator: np.random.Generator) -> np.ndarray:
         """Return the state before the first sample."""
@@ -43,7 +48,8 @@ class LaserNoise:
             return generator.standard_normal(_PINK_TIMES.size)
         if self._kind == "averaged":
             return generator.standard_normal(self._window - 1)
-        return np.zeros(0)
+        # samples that are left of a reading, and its noise
+        return np.zeros(2)
 
     def shape(
         self, white: np.ndarray, chunk: int, generator: np.random.Generator, state: np.ndarray
@@ -56,7 +62,7 @@ class LaserNoise:
         samples = white.size
         if self._kind == "student":
             drawn = generator.standard_t(_FREEDOM, chunk)[:samples]
-            return drawn * math.sqrt((_FREEDOM - 2.0) / _FREEDOM), state
+            return self._repeated(drawn * math.sqrt((_FREEDOM - 2.0) / _FREEDOM), state)
         if self._kind == "pink":
             drawn = generator.standard_normal((_PINK_TIMES.size, chunk))[:, :samples]
             # takes a second to import, and one noise of six needs it
@@ -78,8 +84,17 @@ class LaserNoise:
             hits, signs, sizes = generator.random((3, chunk))[:, :samples]
             size = _SPIKE[0] * (_SPIKE[1] / _SPIKE[0]) ** sizes
             spikes = np.where(hits < _SPIKES, np.where(signs < 0.5, -size, size), 0.0)
-            return white + spikes, state
+            spikes, after = self._repeated(spikes, state)
+            return white + spikes, after
         return white, state
+
+    def _repeated(self, drawn: np.ndarray, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``drawn`` (N,) with each value for all samples of a reading, and the state."""
+        left, before = int(state[0]), state[1]
+        reading = (np.arange(drawn.size) - left) // self._repeats  # -1: of the last chunk
+        noise = np.where(reading < 0, before, drawn[np.maximum(reading, 0)])
+        next_at = left + (int(reading[-1]) + 1) * self._repeats
+        return noise, np.array([next_at - drawn.size, noise[-1]])
 
     @property
     def step(self) -> float:

@@ -263,7 +263,7 @@ class SimulatedRig:
                 end = min(run.delivered + self._block_size(run), run.total)
                 acquired = min(self._ticks(run), run.total)
                 try:
-                    self._card.check_buffer(acquired - run.delivered)
+                    self._card.check_buffer(acquired - run.delivered, self._rate)
                     self._check_output(run, acquired)
                     self._card_fails(run)
                     silent = self._silent(run)

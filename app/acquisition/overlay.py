@@ -15,7 +15,14 @@ from dearig.model import kernel
 from dearig.model.effects import SENSOR_MEMORY
 from dearig.model.errors import ModelError
 from dearig.model.film.sensor import at_sensor
-from dearig.model.simulation.actuator import NO_AIR, STATUS_WORDS, Actuator, at_rest, initial_state
+from dearig.model.simulation.actuator import (
+    NO_AIR,
+    STATUS_WORDS,
+    Actuator,
+    at_rest,
+    ends_of,
+    initial_state,
+)
 
 __all__ = ["Overlay", "OverlayModel"]
 
@@ -39,7 +46,8 @@ class OverlayModel:
 class Overlay:
     """``actuator`` driven by the ``command`` or the ``monitor`` voltage of a run's blocks.
 
-    ``channels`` are those of the blocks, in their order, on a clock of ``rate`` Hz. The film starts
+    ``channels`` are those of the blocks, in their order, with ``rate`` rows a second. Each is the
+    mean of ``average`` conversions; between means the voltage is linear. The film starts
     at rest; its state and the sensor's are carried from block to block, so that the result does not
     depend on the length of the blocks, except for integration errors (hundredths of a micrometre).
     The temperature rise is the mean of the last second less the mean of the first.
@@ -54,6 +62,7 @@ class Overlay:
         channels: Sequence[Channel],
         rate: float,
         drive: str = "command",
+        average: int = 1,
     ) -> None:
         names = [channel.name for channel in channels]
         if f"voltage_{drive}" not in names:
@@ -64,6 +73,10 @@ class Overlay:
         self._channels = tuple(channels)
         reading = next((c for c in channels if c.name == "displacement"), None)
         self._lag = 0.0 if reading is None else reading.delay - reading.skew
+        if average > 1:
+            # as ``Readings.lag`` of the recording
+            self._lag += 0.5 / (rate * average)
+        self._holds = average == 1
         self._rate = rate
         self._length = actuator.film.length
         self._coefficients = actuator.coefficients()
@@ -111,7 +124,14 @@ class Overlay:
             air = np.stack((np.full(time.size, now), np.zeros(time.size)))
         stretch, speed = np.empty(time.size), np.empty(time.size)
         status, reached, _ = kernel.drive_by_voltage(
-            self._coefficients, time, voltage, voltage, air, self._state, stretch, speed
+            self._coefficients,
+            time,
+            voltage,
+            ends_of(voltage, self._holds),
+            air,
+            self._state,
+            stretch,
+            speed,
         )
         moved = (stretch - self._rest) * self._length
         out = self._sensed(time[first:], moved[first:], speed[first:] * self._length)

@@ -30,7 +30,8 @@ class Plan:
     for each ``stride`` samples, M in all, in single precision: ``displacement`` (M,) m, the true
     ``field`` (M,) V/m at the highest voltage among them. Both are NaN from the sample at which the
     model fails, or at which the voltage exceeds its limit. ``waveform`` has passed the gate, or is
-    None with the ``reasons``, one sentence each.
+    None with the ``reasons``, one sentence each. Every ``average`` samples are one row of the
+    recording.
     """
 
     name: str
@@ -41,6 +42,12 @@ class Plan:
     field: np.ndarray
     waveform: GatedWaveform | None
     reasons: tuple[str, ...] = ()
+    average: int = 1
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of the recording, each the mean of ``average`` samples."""
+        return self.samples // self.average
 
     @property
     def samples(self) -> int:
@@ -80,6 +87,8 @@ def plan(
 ) -> Plan:
     """Plan ``loaded`` as the rig would play it, and check it with the gate.
 
+    The rig's clock runs at the rate of conversions: every step that the output makes is checked.
+
     The response is predicted with ``model``, by default that of the rig file's film with Table 3's
     network: a stretched film is thinner, so its field is higher. ``film`` names the film on the
     rig, by default the rig file's. ``progress`` may raise an exception to end the planning.
@@ -87,7 +96,7 @@ def plan(
 
     Raises ``InputError`` where the model cannot be simulated at all (a film without a rest state).
     """
-    rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
+    rate, limits = rig_file.card.conversion_rate_Hz, rig_file.gate_limits()
     name, voltage = loaded.sequence.name, loaded.on_clock(rate)
     film = film or rig_file.film.name
     waveform: GatedWaveform | None = None
@@ -102,7 +111,7 @@ def plan(
         raise InputError(f"sequence {name!r} with this rig file: {error}") from error
     return Plan(
         name, rate, voltage, response.stride, response.displacement, response.field, waveform,
-        reasons,
+        reasons, rig_file.card.average,
     )  # fmt: skip
 
 

@@ -30,6 +30,7 @@ from dearig.config.sequencefile import LoadedSequence
 from dearig.drivers.errors import AddressError, NotAtZero, RefusedWaveform, RigError
 from dearig.drivers.interlocks import Interlocks, Trip
 from dearig.drivers.rig import Block, Event, Rig
+from dearig.drivers.row_means import RowMeans, row_channels
 from dearig.errors import (
     DearigError,
     InputError,
@@ -163,20 +164,32 @@ def record(
             raise InputError(f"rig {address!r}: its driver cannot correct a run while it goes on")
         with interrupts or Interrupts() as interrupts:
             try:
-                rate = rig.load(waveform)
-                identity = rig.identify()
+                # conversions go to interlocks and feedback, rows to recording and observers
+                conversion_rate = rig.load(waveform)
+                channels = rig.identify().channels
+                rows = RowMeans(rig_file.card.average)
+                rate = conversion_rate / rows.average
+                identity = replace(rig.identify(), channels=row_channels(channels, rows.average))
                 room.begin(rate)
                 if loop is not None:
-                    loop.begin(identity.channels)
+                    loop.begin(channels)
             except RefusedWaveform as error:
                 raise InputError(f"the rig refuses the sequence: {error}") from error
             except RigError as error:
                 raise InstrumentFault(str(error)) from error
-            check_room(out, len(identity.channels), rate, waveform.samples)
+            samples = rows.row(waveform.samples)
+            if not samples:
+                raise InputError(
+                    f"sequence {planned.name!r} is shorter than one row of the recording, which "
+                    f"is the mean of card.average = {rows.average} conversions: make it longer"
+                )
+            check_room(out, len(channels), rate, samples, rows.average)
             stepped = None
             if overlay is not None:
                 try:
-                    stepped = Overlay(overlay.actuator, identity.channels, rate)
+                    stepped = Overlay(
+                        overlay.actuator, identity.channels, rate, average=rows.average
+                    )
                 except ModelError as error:
                     raise InputError(f"the overlay model: {error}") from error
             metadata = RunMetadata(
@@ -195,7 +208,7 @@ def record(
                 },
             )
             writer = RecordingWriter(
-                out, identity, rate, waveform.samples, metadata,
+                out, identity, rate, samples, metadata, average=rows.average,
                 overwrite=options.overwrite, fsync=options.fsync, overlay=stepped is not None,
                 environment=room.exists,
             )  # fmt: skip
@@ -203,8 +216,8 @@ def record(
             observer.started(planned, identity, rate)
             interlocks = Interlocks(
                 rig_file if loop is None else loop.watched(),
-                identity.channels,
-                rate,
+                channels,
+                conversion_rate,
                 planned.displacement_of_samples,
                 waveform,
                 laser_grace=0.0 if feedback is None else feedback.laser_loss,
@@ -219,20 +232,20 @@ def record(
                 clock=clock,
             )
             with EventLog() as event_log:
-                last = LastSamples(identity.channels, rig_file.limits.zero_tolerance_kV * 1e3)
+                last = LastSamples(channels, rig_file.limits.zero_tolerance_kV * 1e3)
                 run = _Run(
-                    rig, recorder, interlocks, interrupts, marks or RunMarks(), observer,
+                    rig, rows, recorder, interlocks, interrupts, marks or RunMarks(), observer,
                     event_log, last, progress, clock, loop, room,
                 )  # fmt: skip
                 try:
-                    events = run.follow(waveform.samples)
+                    events = run.follow(samples)
                 except DearigError as error:
                     error.output_state = run.output_state
                     raise
         return RunResult(
             recorder.path, recorder.samples, rate, "finished", events,
             waveform.margins if loop is None else loop.gate.margins, run.output_state,
-            None if loop is None else loop.report(),
+            None if loop is None else loop.report(), rows.average,
         )  # fmt: skip
     finally:
         try:
@@ -247,6 +260,7 @@ class _Run:
     def __init__(
         self,
         rig: Rig,
+        rows: RowMeans,
         recorder: Recorder,
         interlocks: Interlocks,
         interrupts: Interrupts,
@@ -260,6 +274,7 @@ class _Run:
         room: RoomOfRun,
     ) -> None:
         self._rig = rig
+        self._rows = rows
         self._room = room
         self._loop = loop
         self._recorder = recorder
@@ -382,17 +397,22 @@ class _Run:
 
     def _take(self, block: Block) -> None:
         self._last.take(block)
-        self._recorder.append(block)
-        self._observer.block(block)
-        for event in block.events:
-            self._tell(event)
+        rows = self._rows.take(block)
+        if rows.counts.shape[1]:
+            self._recorder.append(rows)
+            self._observer.block(rows)
+            for event in rows.events:
+                self._tell(event)
+        else:
+            self._note_events(list(rows.events))
         self._note_events(self._marks.reach(self._recorder.received))
 
     def _watch(self, block: Block) -> Trip | None:
         """Return the interlock that trips now, if any; every one is recorded as an event."""
         self._tell_notices()
         free = self._recorder.free_bytes()
-        trips = self._interlocks.watch(block)
+        # every conversion is checked, not the mean of a row
+        trips = [self._in_rows(trip) for trip in self._interlocks.watch(block)]
         self._unread = self._rig.waiting
         late = self._interlocks.late(self._unread)
         full = None if free is None else self._interlocks.disk(free)
@@ -421,10 +441,16 @@ class _Run:
         answers, events, trip = self._loop.take(block, self._unread)
         for at, answer in answers:
             self._observer.answered(at, answer)
-        self._note_events(events)
+        for event in events:
+            self._note(self._rows.row(event.sample), event.level, event.message)
         if trip is not None:
+            trip = self._in_rows(trip)
             self._note_trip(trip)
         return trip
+
+    def _in_rows(self, trip: Trip) -> Trip:
+        """Return ``trip``, which counts in conversions, at its row."""
+        return replace(trip, sample=self._rows.row(trip.sample))
 
     def _report_feedback(self) -> None:
         """Record what the feedback did, whatever ended the run."""

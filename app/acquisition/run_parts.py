@@ -72,7 +72,8 @@ class RunResult:
     the ``events`` say so.
 
     ``margins`` are the distances of the voltage from each limit of the gate, and ``output_state``
-    is what was known of the rig's output after the run. ``feedback`` is what a feedback did.
+    is what was known of the rig's output after the run. ``feedback`` is what a feedback did. Each
+    sample is the mean of ``average`` conversions.
     """
 
     path: Path
@@ -83,6 +84,7 @@ class RunResult:
     margins: tuple[Margin, ...]
     output_state: OutputState
     feedback: FeedbackReport | None = None
+    average: int = 1
 
 
 class RunObserver:

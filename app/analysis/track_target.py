@@ -90,6 +90,13 @@ def check_feasible(
 
 
 def lag_of(rig_file: RigFile) -> float:
-    """Return by how much a reading is older than the sample at which it is recorded, in s."""
+    """Return by how much a reading is older than the sample at which it is recorded, in s.
+
+    The model's voltage is held from row to row. With N = ``card.average`` conversions in a row the
+    rig goes on a line from one value to the next, held from conversion to conversion: it is
+    (1 - 1/N)/2 rows ahead of that. A reading is the mean about (1 - 1/N)/2 rows after the first.
+    """
     inputs = [name for name in rig_file.terminals() if name != "voltage_command"]
-    return rig_file.laser.delay - rig_file.skew(inputs.index("displacement"))
+    lag = rig_file.laser.delay - rig_file.skew(inputs.index("displacement"))
+    card = rig_file.card
+    return lag - (1.0 - 1.0 / card.average) / card.sample_rate_Hz

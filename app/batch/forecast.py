@@ -81,7 +81,7 @@ def survey(
     Each different sequence is checked by the gate once, as a run does it; ``model`` and ``film`` as
     of a run. With ``whole`` False it ends at the first run that is refused.
     """
-    rate, channels = float(rig_file.card.sample_rate_Hz), len(rig_file.terminals())
+    card, channels = rig_file.card, len(rig_file.terminals())
     known: dict[str, tuple[float, int, str]] = {}
     margins: dict[str, Margin] = {}
     durations, digests, sizes, refused = [], [], [], []
@@ -97,13 +97,13 @@ def survey(
             digest = digest_of(loaded)
             if digest not in known:
                 planned = plan(loaded, rig_file, model, film)
-                known[digest] = planned.duration, planned.samples, _refusal(planned)
+                known[digest] = planned.duration, planned.rows, _refusal(planned)
                 for margin in () if planned.waveform is None else planned.waveform.margins:
                     before = margins.get(margin.quantity)
                     if before is None or _part(margin) > _part(before):
                         margins[margin.quantity] = margin
             duration, samples, reason = known[digest]
-            needs = estimate_bytes(channels, rate, samples)
+            needs = estimate_bytes(channels, card.sample_rate_Hz, samples, card.average)
         largest = max(largest, needs)
         durations.append(duration)
         digests.append(digest)

@@ -209,10 +209,11 @@ def _announcer(
 
 def _show_run(console: Console, result: RunResult) -> None:
     seconds = result.samples / result.rate_Hz
+    means = f" in means of {result.average} conversions" if result.average > 1 else ""
     print_line(
         console,
-        f"{result.path}: {result.samples} samples, {seconds:.1f} s at {result.rate_Hz:g} Hz, "
-        f"{result.outcome}",
+        f"{result.path}: {result.samples} samples, {seconds:.1f} s at {result.rate_Hz:g} Hz"
+        f"{means}, {result.outcome}",
     )
     for margin in result.margins:
         print_line(
@@ -229,6 +230,7 @@ def _run_json(result: RunResult) -> dict[str, Any]:
         "recording": str(result.path),
         "samples": result.samples,
         "rate_Hz": result.rate_Hz,
+        "average": result.average,
         "outcome": result.outcome,
         "events": list(result.events),
         "margins": [asdict(margin) for margin in result.margins],

@@ -67,27 +67,31 @@ _KNOWN: dict[int, tuple[str, str]] = {
     ),
     -200332: (
         "the sample rate is too high for so many channels",
-        "lower card.sample_rate_Hz",
+        "lower card.sample_rate_Hz or card.average",
     ),
     -200081: (
         "the conversions of all inputs do not fit between two samples",
-        "lower card.sample_rate_Hz or card.convert_interval_us, or read fewer inputs",
+        "lower card.sample_rate_Hz, card.average or card.convert_interval_us, or read fewer inputs",
     ),
     -200279: (
         "the inputs were read too late and the oldest samples were overwritten",
-        "close other programs, lower card.sample_rate_Hz or enlarge card.ai_buffer_samples",
+        "close other programs, lower card.sample_rate_Hz or card.average, or enlarge "
+        "card.ai_buffer_samples",
     ),
     -200361: (
         "its input memory overflowed: samples came faster than the computer read them",
-        "lower card.sample_rate_Hz, or move the card to a bus that it does not share",
+        "lower card.sample_rate_Hz or card.average, or move the card to a bus that it does not "
+        "share",
     ),
     -200290: (
         "the output ran out of samples: the program wrote too late, and the last value was held",
-        "close other programs, lower card.sample_rate_Hz or enlarge card.ao_buffer_s",
+        "close other programs, lower card.sample_rate_Hz or card.average, or enlarge "
+        "card.ao_buffer_s",
     ),
     -200621: (
         "its output memory ran empty: the computer sent samples too slowly",
-        "lower card.sample_rate_Hz, or move the card to a bus that it does not share",
+        "lower card.sample_rate_Hz or card.average, or move the card to a bus that it does not "
+        "share",
     ),
     -200284: (
         "no samples came in time: its sample clock does not run",

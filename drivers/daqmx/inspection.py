@@ -127,11 +127,13 @@ def _card(name: str, card: Any, settings: RigSettings) -> list[Finding]:
         key = f"card.do_hv_enable = {wanted.do_hv_enable}"
         found.append(_has(name, key, wanted.do_hv_enable in lines, "one of the card's lines"))
     fastest = min(card.ao_max_rate, card.ai_max_multi_chan_rate / (len(settings.terminals()) - 1))
-    fast = wanted.sample_rate_Hz <= fastest
+    fast = wanted.conversion_rate_Hz <= fastest
+    averages = wanted.average > 1
     found.append(
         Finding(
-            name, "card.sample_rate_Hz", f"{wanted.sample_rate_Hz:g}", f"{fastest:g} or less",
-            "ok" if fast else "wrong", "" if fast else "lower it",
+            name, "card.sample_rate_Hz" + (" x card.average" if averages else ""),
+            f"{wanted.conversion_rate_Hz:g}", f"{fastest:g} or less", "ok" if fast else "wrong",
+            "" if fast else "lower one of them" if averages else "lower it",
         )
     )  # fmt: skip
     return found

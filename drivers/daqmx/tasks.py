@@ -158,7 +158,7 @@ class ClockedTasks:
         with self._errors():
             self._make_output()
             self._output().control(TaskMode.TASK_RESERVE)
-            ai = self._make_inputs(settings.card.sample_rate_Hz)
+            ai = self._make_inputs(settings.card.conversion_rate_Hz)
             ai.control(TaskMode.TASK_RESERVE)
             return actual_channels(ai, settings)
 

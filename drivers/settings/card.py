@@ -16,7 +16,10 @@ from dearig.drivers.settings.section import (
     Wiring,
 )
 
-__all__ = ["WATCHDOG_DEFAULT_S", "CardSettings"]
+__all__ = ["AVERAGE_MAX", "WATCHDOG_DEFAULT_S", "CardSettings"]
+
+#: conversions of one row, at most: the sum of so many 16-bit counts fits in 32 bits
+AVERAGE_MAX = 65536
 
 #: s; a run resets the watchdog with every read, at most 0.25 s apart, so three late reads are
 #: tolerated; with it any two faults end within 1.1 s
@@ -33,7 +36,17 @@ class CardSettings(Section):
     model: str = Field(default="NI PCIe-6361", description="type of the card")
     device: str = Field(default="Dev1", min_length=1, description="name of the card in NI MAX")
     sample_rate_Hz: float = Field(
-        default=1000.0, ge=1.0, le=1e6, description="sample rate of the output and the inputs"
+        default=1000.0,
+        ge=1.0,
+        le=1e6,
+        description="rate of the recording's rows; without averaging also that of the converters",
+    )
+    average: int = Field(
+        default=1,
+        ge=1,
+        le=AVERAGE_MAX,
+        description="number of conversions whose mean is one row of the recording: output and "
+        "inputs run at sample_rate_Hz times this number, and interlocks check every conversion",
     )
     bits: Literal[16] = Field(
         default=16, description="resolution of all converters; only 16 is supported"
@@ -171,6 +184,11 @@ class CardSettings(Section):
         le=1000.0,
         description="simulated rig only: spread of the inputs' calibration, as a part of the range",
     )
+
+    @property
+    def conversion_rate_Hz(self) -> float:  # noqa: N802
+        """Return the rate of the output and the inputs in Hz."""
+        return self.sample_rate_Hz * self.average
 
     @property
     def watchdog_s(self) -> float:

@@ -231,15 +231,18 @@ class RigSettings(Section):
     def _check_sampling(self) -> None:
         card = self.card
         inputs = self._input_terminals()
+        rate = "card.sample_rate_Hz"
+        if card.average > 1:
+            rate = f"card.sample_rate_Hz x card.average ({card.sample_rate_Hz:g} x {card.average})"
         _require_at_most(
             "card.first_convert_us and card.convert_interval_us: the scan, in us,",
             self.skew(len(inputs) - 1) * 1e6 + card.convert_interval_us,
-            1e6 / card.sample_rate_Hz,
-            "one sample interval at card.sample_rate_Hz",
+            1e6 / card.conversion_rate_Hz,
+            f"one sample interval at {rate}",
         )
         _require_at_most(
-            "card.sample_rate_Hz",
-            card.sample_rate_Hz,
+            rate,
+            card.conversion_rate_Hz,
             min(card.ao_rate_max_kHz, card.ai_rate_max_kHz / len(inputs)) * 1e3,
             "what the card can do on this many channels",
         )

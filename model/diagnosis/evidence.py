@@ -40,12 +40,19 @@ def family_of(member: str) -> str:
 
 
 def _coloured_rest(baseline: Fit) -> tuple[np.ndarray, ...]:
-    """Return each record's readings before its voltage, where they are not white; else ()."""
+    """Return each record's readings before its voltage, where they are not white; else ().
+
+    Means of conversions share readings of a sensor that averages too: they are never taken for
+    white.
+    """
     rest = [
         part[at_rest(record)]
         for part, record in zip(baseline.by_record(), baseline.problem.records, strict=True)
     ]
-    if min(part.size for part in rest) < _REST_MIN or all(map(is_flat, rest)):
+    if min(part.size for part in rest) < _REST_MIN:
+        return ()
+    averaged = any(getattr(record, "average", 1) > 1 for record in baseline.problem.records)
+    if not averaged and all(map(is_flat, rest)):
         return ()
     return tuple(rest)
 

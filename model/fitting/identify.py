@@ -264,7 +264,8 @@ def _misfit_p(problem: Problem, residuals: np.ndarray) -> float | None:
         if isinstance(record, ActuatorRecord):
             good = np.isfinite(problem.sigma[part])
             left = np.where(good, residuals[part] * record.noise, np.nan)
-            found.append(misfit_p(left, record.displacement[: record.lead_in]))
+            rest = record.displacement[: record.lead_in]
+            found.append(misfit_p(left, rest, averaged=record.average > 1))
     return smallest_p(found)
 
 

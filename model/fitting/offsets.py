@@ -53,6 +53,6 @@ def _weights(record: ActuatorRecord) -> np.ndarray:
     """
     valid = np.ones(record.measured.size) if record.valid is None else record.valid.astype(float)
     count = max(float(valid.sum()), 1.0)
-    before = 0.0 if record.lead_in else 1.0 / record.means_of
+    before = 0.0 if record.lead_in else record.average / record.means_of
     share = 1.0 - (before / (count + before)) ** 0.5
     return np.asarray(share * valid / count)

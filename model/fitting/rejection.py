@@ -45,7 +45,9 @@ class NoiseTest:
         return min(1.0, len(found) * min(found))
 
 
-def noise_test(residual: np.ndarray, rest: np.ndarray | None = None) -> NoiseTest:
+def noise_test(
+    residual: np.ndarray, rest: np.ndarray | None = None, *, averaged: bool = False
+) -> NoiseTest:
     """Return how probable a residual is by noise alone.
 
     Parameters
@@ -55,6 +57,9 @@ def noise_test(residual: np.ndarray, rest: np.ndarray | None = None) -> NoiseTes
     rest
         Readings before the voltage (M,), in the same unit. Without, or with fewer than 100, noise
         is taken for white, and of the size nothing is said.
+    averaged
+        Whether the readings are means of conversions: neighbours then share readings of a sensor
+        that averages too, and their noise is not white, even where the few at rest seem to be.
 
     Notes
     -----
@@ -79,7 +84,7 @@ def noise_test(residual: np.ndarray, rest: np.ndarray | None = None) -> NoiseTes
     size = f_distribution.sf(
         float(np.mean(left**2)) / variance, left.size / apart, max(still.size / apart - 1.0, 1.0)
     )
-    white = is_flat(still)
+    white = not averaged and is_flat(still)
     away, lines = spectrum_distance(left, None if white else still)
     # twice as far as the readings at rest show it: what is left is below what they would show
     every = 1 if white else 2 * correlation_end(still)
@@ -92,7 +97,7 @@ def noise_test(residual: np.ndarray, rest: np.ndarray | None = None) -> NoiseTes
     )
 
 
-def misfit_p(residual: np.ndarray, rest: np.ndarray) -> float | None:
+def misfit_p(residual: np.ndarray, rest: np.ndarray, *, averaged: bool = False) -> float | None:
     """Return the probability of ``noise_test`` by all tests.
 
     None where too few readings are at rest, or too few are left.
@@ -100,7 +105,7 @@ def misfit_p(residual: np.ndarray, rest: np.ndarray) -> float | None:
     left, still = residual[np.isfinite(residual)], rest[np.isfinite(rest)]
     if still.size < _REST_MIN or left.size < _REST_MIN or np.ptp(still) == 0.0:
         return None
-    return noise_test(left, still).p
+    return noise_test(left, still, averaged=averaged).p
 
 
 def _ljung_box(residual: np.ndarray) -> float:

@@ -11,7 +11,7 @@ from dearig.model.errors import ModelError
 from dearig.model.readings.channels import ElectricRecord
 from dearig.model.simulation.actuator import Drive
 
-__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "interpolated"]
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "interpolated", "mean_about"]
 
 _MATCHING = 10  # iterations; each leaves a third of the error of the one before
 
@@ -32,16 +32,16 @@ class ActuatorRecord:
 
     ``noise`` is the standard deviation of one reading in m. ``lag`` is the known time in s by which
     a reading is older than its time stamp (an averaging sensor), less the converter's skew: the
-    model is evaluated at ``time - lag``; it is known within ``lag_error``. ``valid`` (N,)
-    bool is False where a reading must not be used (a dropout, a clipped sensor), None where all are
-    good. Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it
-    is counted from there. Each reading is the mean of ``means_of`` that were taken, evenly about
-    its time. ``coarse_drive``, where there is one, is the drive in fewer and longer steps
-    (``dearig.model.fitting.coarse_drive``); the effect of a parameter is estimated with it.
-    ``rounding`` m is the part of ``noise`` that is the step of coarse readings: neighbours are
-    rounded alike, so that their mean keeps it. ``electric`` are the readings of the voltage monitor
-    and the current of every sample; they stay as they are where the record is thinned. None where a
-    recording has none.
+    model is evaluated at ``time - lag``; it is known within ``lag_error``. ``valid`` (N,) bool is
+    False where a reading must not be used (a dropout, a clipped sensor), None where all are good.
+    Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it is
+    counted from there. Each reading is the mean of ``means_of`` conversions that were taken evenly
+    about its time; the rig recorded means of ``average``. ``coarse_drive``, where there is one, is
+    the drive in fewer and longer steps (``dearig.model.fitting.coarse_drive``); the effect of a
+    parameter is estimated with it. ``rounding`` m is the part of ``noise`` that is the step of
+    coarse readings: neighbours are rounded alike, so that their mean keeps it. ``electric`` are the
+    readings of the voltage monitor and the current of every sample; they stay as they are where the
+    record is thinned. None where a recording has none.
     """
 
     name: str
@@ -52,6 +52,7 @@ class ActuatorRecord:
     valid: np.ndarray | None = None
     lead_in: int = 0
     means_of: int = 1
+    average: int = 1
     lag_error: float = 0.0
     coarse_drive: Drive | None = None
     rounding: float = 0.0
@@ -72,7 +73,7 @@ class ActuatorRecord:
 
     def seen(self, displacement: np.ndarray) -> np.ndarray:
         """Return a ``displacement`` (..., N) as it is read: averaged, from the lead-in's mean."""
-        return counted(_mean_about(displacement, self.means_of), self.lead_in)
+        return counted(mean_about(displacement, self.means_of), self.lead_in)
 
     def coarse(self, rate: float) -> ActuatorRecord:
         """Return the record at about ``rate`` Hz or less, in means of neighbours."""
@@ -119,7 +120,7 @@ class ActuatorRecord:
         )
 
 
-def _mean_about(values: np.ndarray, many: int) -> np.ndarray:
+def mean_about(values: np.ndarray, many: int) -> np.ndarray:
     """Return means over intervals of ``many`` readings, centred on ``values`` (..., N).
 
     Of as many samples of each interval, evenly spaced. From neighbours, to the fourth order in the

@@ -110,10 +110,11 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     # at rest there is neither loading nor unloading
     moving = np.abs(up) > 0.02 * float(np.max(np.abs(up)) or 1.0)
     used = residual[good]
-    rest = None
+    rest, averaged = None, False
     if isinstance(record, ActuatorRecord):
         rest = record.displacement[: record.lead_in][good[: record.lead_in]]
-    test = noise_test(used, rest)
+        averaged = record.average > 1
+    test = noise_test(used, rest, averaged=averaged)
     dependences = tuple(
         _dependence(n, u, q[good], used, up[good], moving[good], test.apart)
         for n, u, q in quantities

@@ -33,6 +33,7 @@ __all__ = [
     "Response",
     "at_rest",
     "effect_values",
+    "ends_of",
     "initial_state",
     "reading_of",
     "readings_of",

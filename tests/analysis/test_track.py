@@ -99,6 +99,18 @@ def test_a_wrong_model_learns(learned):
     assert learned.status == "complete"
 
 
+def test_a_target_is_followed_in_means_of_conversions(tmp_path):
+    rig_file = RigFile(card=CardSettings(sample_rate_Hz=200.0, average=10))
+    outcome = followed(tmp_path / "out", rig_file=rig_file)
+    (run,) = outcome.runs
+    assert open_recording(run.recording).average == 10
+    expected = outcome.inversion.reading
+    left, speed = run.measured - expected, 200.0 * np.gradient(expected)
+    late = -np.nansum(left * speed) / np.sum(speed**2)
+    assert abs(late) < 2e-4  # of a row of 5 ms, nine tenths of which the rig is ahead
+    assert np.nanstd(left) < 1.2 * run.noise
+
+
 RINGING = ModelFile(
     "ringing",
     Actuator(

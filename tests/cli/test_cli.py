@@ -225,7 +225,7 @@ def test_record_says_in_json_what_it_did(tmp_path: Path) -> None:
     margins = {m["quantity"]: m for m in found.pop("margins")}
     assert found == {
         "format": "dearig-run/1", "recording": str(out), "samples": 1501, "rate_Hz": 1000.0,
-        "outcome": "finished", "events": [],
+        "average": 1, "outcome": "finished", "events": [],
     }  # fmt: skip
     assert margins["voltage"]["allowed"] == 8.5
     assert 0.0 < margins["true field"]["reached"] < margins["true field"]["allowed"]

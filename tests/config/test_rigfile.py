@@ -93,6 +93,21 @@ MISTAKES = [
     ("[film]\nlength_mm = nan", r"film\.length_mm = NaN is not allowed"),
     ("[film]\nlength_mm = true", r"film\.length_mm = true is not allowed"),
     ("[card]\nai_buffer_samples = 1.5", r"= 1\.5 is not allowed, but a whole number from 1000"),
+    (
+        "[card]\naverage = 100",
+        r"the scan, in us, = 80 is more than 10: one sample interval at card\.sample_rate_Hz x "
+        r"card\.average \(1000 x 100\)",
+    ),
+    (
+        "[card]\nsample_rate_Hz = 10000.0\naverage = 40\nfirst_convert_us = 0.0\n"
+        "convert_interval_us = 0.8",
+        r"card\.sample_rate_Hz x card\.average \(10000 x 40\) = 400000 is more than 333333: what "
+        r"the card can do",
+    ),
+    (
+        "[card]\naverage = 0",
+        r"card\.average = 0 is not allowed, but a whole number from 1 to 65536",
+    ),
     ("[card]\nao_command = 'dac'", r'ao_command = "dac" is not allowed, but a text such as ao0'),
     ("[film]\nkinematics = 'free'", r'"free" is not allowed, but "constrained-width" or "uni'),
     ("[laser]\naveraging = 15", r"laser\.averaging = 15 is not allowed: .* offers 1, 4, 16, 64"),

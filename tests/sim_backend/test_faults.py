@@ -311,7 +311,9 @@ def test_a_late_reply_keeps_the_reader_waiting_once_and_loses_nothing():
 
 
 def test_a_late_reply_that_is_too_late_for_the_buffer_loses_samples():
-    settings = RigFile.model_validate({"card": {"ai_buffer_samples": 1000}})
+    settings = RigFile.model_validate(
+        {"card": {"ai_buffer_samples": 1000}, "interlocks": {"late_s": 0.25}}
+    )
     rig = open_simulated_rig(
         "sim", settings, settings.as_film(), settings.as_load(),
         faults=FaultPlan.parse(["late-reply@1+3"]),

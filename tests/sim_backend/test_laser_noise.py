@@ -78,3 +78,21 @@ def test_an_address_with_a_hand_and_a_noise_opens_that_rig():
             plant_of(wrong, THESIS_FILM, THESIS_LOAD)
     with pytest.raises(AddressError, match=r"pink noise.* write sim:7:second"):
         plant_of("sim:7:second:pink", THESIS_FILM, THESIS_LOAD)
+
+
+@pytest.mark.parametrize("kind", ["student", "spikes"])
+@pytest.mark.parametrize("cut", [CHUNK, 333])
+def test_a_fast_clock_samples_each_reading_several_times(kind, cut):
+    # 32 samples in the sensor's average
+    noise = LaserNoise(kind, 1e-5, 32e-5)
+    state, parts = noise.start(np.random.default_rng(0)), []
+    for i in range(40):
+        generator = np.random.default_rng((3, i))
+        part, state = noise.shape(np.zeros(cut), CHUNK, generator, state)
+        parts.append(part)
+    values = np.concatenate(parts)
+    readings = values[: values.size // 32 * 32].reshape(-1, 32)
+    assert (readings == readings[:, :1]).all()
+    if kind == "student" and cut == CHUNK:
+        assert np.count_nonzero(np.diff(readings[:, 0])) == len(readings) - 1
+        assert readings[:, 0].std() == pytest.approx(1.0, rel=0.1)

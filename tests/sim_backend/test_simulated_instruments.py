@@ -233,7 +233,12 @@ def test_rates_are_divided_from_the_timebase(rate, actual):
 
 def test_buffer():
     card = Converters(RigSettings(), Streams((1,)))
-    card.check_buffer(100_000)
+    card.check_buffer(100_000, 1000.0)
     with pytest.raises(RigError, match=r"100001 samples waited .* holds 100000") as caught:
-        card.check_buffer(100_001)
+        card.check_buffer(100_001, 1000.0)
     assert caught.value.code == -200279
+
+
+def test_buffer_holds_more_than_the_delay_that_ends_a_run():
+    settings = RigSettings()
+    Converters(settings, Streams((1,))).check_buffer(round(4e5 * settings.interlocks.late_s), 1e5)

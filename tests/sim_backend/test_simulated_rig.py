@@ -217,7 +217,9 @@ def test_rates_that_the_card_cannot_do_are_refused(rate, message):
 
 def test_a_reader_that_comes_too_late_gets_the_cards_own_error():
     clock = ManualClock()
-    settings = RigFile.model_validate({"card": {"ai_buffer_samples": 1000}})
+    settings = RigFile.model_validate(
+        {"card": {"ai_buffer_samples": 1000}, "interlocks": {"late_s": 0.25}}
+    )
     rig = open_rig(settings=settings, clock=clock)
     begin(rig, lobes(peaks=(8000.0,) * 20))
     rig.read()

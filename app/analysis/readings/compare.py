@@ -16,7 +16,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.readings.measures import errors
 from dearig.model.readings.noise import LEAD_IN
-from dearig.model.readings.records import counted
+from dearig.model.readings.records import counted, mean_about
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.strip import Strip
 from dearig.recording.content.layout import SIGNALS
@@ -89,6 +89,7 @@ def compare(
         quiet_count=noise.count if noise and noise.source == LEAD_IN else 0,
         origin=origin_of(recording, hashed),
         step=_converter_step(recording),
+        average=recording.average,
         channels=_channels(readings, model),
     )
 
@@ -140,7 +141,8 @@ def _actuator(readings: Readings, model: Actuator | Strip) -> _Predicted:
     response = model.simulate(drive, readings.lag)
     if not response.ok:
         raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
-    predicted = counted(response.displacement, readings.lead_in)
+    means = mean_about(response.displacement, recording.average)
+    predicted = counted(means, readings.lead_in)
     usable = np.ones(predicted.size, dtype=bool) if valid is None else valid
     spiky, said = spikes_about(
         recording, readings.displacement - predicted, usable, drive.voltage**2
@@ -156,7 +158,7 @@ def _converter_step(recording: Recording) -> float:
     """
     for channel in recording.channels:
         if channel.name == SIGNALS[recording.kind]:
-            return resolution(channel)
+            return resolution(channel, recording.average)
     levels = np.unique(recording.signal[:_STEP_SAMPLES])
     rises = np.diff(levels)
     if rises.size < MIN_QUIET:

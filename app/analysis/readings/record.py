@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from dearig.analysis.readings.channels import electric_of
 from dearig.analysis.readings.early_ends import choose
@@ -92,8 +93,17 @@ class Readings:
 
     @property
     def lag(self) -> float:
-        """Time in s from the film's motion to its reading."""
-        return self.recording.displacement_delay - self.recording.displacement_skew
+        """Time in s from the film's motion to its reading, on the clock of the drive.
+
+        A mean of conversions is about the mean of their ticks. The voltage was held for one
+        conversion after each tick, so that its mean belongs half a conversion later.
+        """
+        recording = self.recording
+        lag = recording.displacement_delay - recording.displacement_skew
+        if recording.average == 1 or recording.samples < 2:
+            return lag
+        row = recording.duration / (recording.samples - 1)
+        return lag + 0.5 * row / recording.average
 
     @cached_property
     def voltage(self) -> Drive:
@@ -112,7 +122,9 @@ class Readings:
             noise = reading_noise(volts)
             if noise > 0.0:
                 volts = smoothed(volts, noise)
-            hold = self.is_held or recording.hold
+            if recording.average > 1:
+                volts = _with_means(volts)
+            hold = (self.is_held or recording.hold) and recording.average == 1
             return Drive(recording.time, volts, hold, warmth, moisture, temperature, humidity)
         except ModelError as error:
             raise InputError(f"{recording.path}: {error}") from error
@@ -182,6 +194,8 @@ class Readings:
             self.lag,
             valid,
             self.lead_in,
+            means_of=recording.average,
+            average=recording.average,
             lag_error=recording.displacement_delay_error,
             rounding=noise.step / math.sqrt(12.0),
             electric=self.electric,
@@ -210,6 +224,18 @@ def read_all(
 def recordings_of(readings: Iterable[Readings]) -> list[Recording]:
     """Return the recordings of ``readings``."""
     return [each.recording for each in readings]
+
+
+def _with_means(means: np.ndarray) -> np.ndarray:
+    """Return the voltage (N,) at the middles of rows, between which it is linear, with ``means``.
+
+    The mean of such a line over a row, half-way to each neighbour, is (v[-1] + 6 v[0] + v[1])/8.
+    The square of the voltage, which pulls, then has the right mean too, to the fourth order.
+    """
+    bands = np.full((3, means.size), 0.125)
+    bands[1] = 0.75
+    bands[1, [0, -1]] = 0.875  # beyond the ends it stands still
+    return np.asarray(solve_banded((1, 1), bands, means))
 
 
 def noise_texts(readings: Iterable[Readings]) -> list[str]:

@@ -22,8 +22,9 @@ NAME = "checksums"
 
 
 def checksum(counts: np.ndarray, before: int = 0) -> int:
-    """Return the CRC-32 (as of zip files) of int16 ``counts`` (n,) as they are in the file."""
-    return zlib.crc32(np.ascontiguousarray(counts, dtype="<i2").data, before)
+    """Return the CRC-32 (as of zip files) of ``counts`` (n,) as they are in the file."""
+    in_file = np.ascontiguousarray(counts, dtype=counts.dtype.newbyteorder("<"))
+    return zlib.crc32(in_file.data, before)
 
 
 class ChecksumWriter:

@@ -6,7 +6,10 @@
                         output_state_time, output_set_by (run, guardian), output_monitor_V
 /entry/title, start_time, end_time
 /entry/entry_identifier_uuid   identifies the recording, whatever its file is called
-/entry/data             NXdata: time and the physical values, and beside them NAME_counts
+/entry/data             NXdata: time and the physical values, and beside them NAME_counts (int16);
+                        where rows are means of several conversions, the attributes average and
+                        conversion_rate_Hz, and the counts are sums over a row (int32), whose
+                        scaling contains the division
                         also of the channels that the rig file declares, by their names; while a
                         run is going on its signal is displacement_counts, and there are no axes
 /entry/instrument/*     one NXinstrument for each instrument, with its settings as an attribute;
@@ -43,6 +46,7 @@ import numpy as np
 from dearig.recording.content.text import fixed, put_text
 
 __all__ = [
+    "AVERAGE_COLUMN",
     "ENVIRONMENT_TYPE",
     "EVENT_LEVELS",
     "EVENT_TYPE",
@@ -60,6 +64,7 @@ __all__ = [
     "ZERO_ORDER",
     "attach_time",
     "counts_name",
+    "counts_type",
     "create_field",
     "declared_names",
     "describe_field",
@@ -123,6 +128,9 @@ LONG_NAMES = MappingProxyType(
 #: Name of the recording's identifier in /entry, as NeXus has it.
 IDENTIFIER = "entry_identifier_uuid"
 
+#: Column of an exported table without metadata: conversions whose mean each row is, if several.
+AVERAGE_COLUMN = "conversions_per_row"
+
 #: Interpolation of the voltage between samples: a converter holds it, imported data are linear.
 ZERO_ORDER, LINEAR = "zero-order", "linear"
 
@@ -154,6 +162,14 @@ ENVIRONMENT_TYPE = np.dtype(
 def counts_name(channel: str) -> str:
     """Return the name of the raw counts of ``channel``."""
     return f"{channel}_counts"
+
+
+def counts_type(average: int) -> np.dtype:
+    """Return the type of the counts of a run whose rows are means of ``average`` conversions.
+
+    The sum of several counts takes 32 bits; that of one is the count, as the converter gave it.
+    """
+    return np.dtype("<i2" if average == 1 else "<i4")
 
 
 def iso_time(moment: float) -> str:

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from dearig.drivers.channels import CHANNEL_NAMES, Channel, Scaling
+from dearig.errors import InputError
 from dearig.recording.content.flushes import flush_notes
 from dearig.recording.content.layout import UNITS, counts_name, declared_names
 from dearig.recording.content.pyramid import levels, reduced
@@ -21,9 +22,11 @@ __all__ = [
     "TEMPERATURE_UNITS",
     "Counts",
     "Rest",
+    "average_of",
     "read_channels",
     "resolution",
     "sample_count",
+    "write_average",
     "write_channel",
 ]
 
@@ -134,10 +137,32 @@ def _readable(counts: h5py.Dataset, at: int) -> bool:
     return True
 
 
-def resolution(channel: Channel) -> float:
-    """Return the size of one count in the channel's unit."""
-    ends = channel.scaling.physical(np.array([0, 1], dtype=np.int16))
+def resolution(channel: Channel, average: int = 1) -> float:
+    """Return the converter's step in the channel's unit, whose counts are sums of ``average``."""
+    ends = channel.scaling.physical(np.array([0, average]))
     return float(abs(ends[1] - ends[0]))
+
+
+def average_of(data: h5py.Group) -> int:
+    """Return the number of conversions whose mean is one row of /entry/data.
+
+    Raises ``InputError`` for what is not a whole number of 1 or more.
+    """
+    value = data.attrs.get("average", 1)
+    if not isinstance(value, int | np.integer) or value < 1:
+        raise InputError(
+            f"{data.file.filename}: average of /entry/data is {value!r}, not a whole number of 1 "
+            f"or more"
+        )
+    return int(value)
+
+
+def write_average(data: h5py.Group, average: int, conversion_rate: float | None = None) -> None:
+    """Note in /entry/data that rows are means of ``average`` conversions, unless it is 1."""
+    if average > 1:
+        data.attrs["average"] = average
+        if conversion_rate is not None:
+            data.attrs["conversion_rate_Hz"] = conversion_rate
 
 
 class Counts:
@@ -154,6 +179,9 @@ class Counts:
         self.data: h5py.Group = entry["data"]
         self.channels = read_channels(self.data)
         self.rate = float(self.data.attrs["rate_Hz"])
+        self.average = average_of(self.data)
+        # time of the first row in rows: a row's time is the mean of its ticks
+        self._first = 0.5 * (1.0 - 1.0 / self.average)
         self.samples = sample_count(self.data, self.channels) if samples is None else samples
         self._by_name = {c.name: c for c in self.channels}
         self._rest = rest
@@ -197,7 +225,7 @@ class Counts:
         channel = self._by_name["voltage_command"]
         low, high = self.extremes("voltage_command", 0, self.samples, 2000)[1:]
         largest = float(np.maximum(np.abs(low), np.abs(high)).max(initial=0.0))
-        threshold = max(resolution(channel), NEGLIGIBLE * largest)
+        threshold = max(resolution(channel, self.average), NEGLIGIBLE * largest)
         for start, stop in self.slices():
             # for most slices of a lead-in the extremes are enough
             _, low, high = self.extremes("voltage_command", start, stop, 1)
@@ -218,7 +246,7 @@ class Counts:
     def window(self, name: str, start: int, stop: int) -> np.ndarray:
         """Return the values (n,) of ``name`` from sample ``start`` to before ``stop``."""
         if name == "time":
-            return np.arange(start, stop) / self.rate
+            return (np.arange(start, stop) + self._first) / self.rate
         values = self._reading(name, start, stop)
         return values - self.rest.reading if name == "displacement" else values
 
@@ -269,4 +297,4 @@ class Counts:
         """Return time in s, minimum and maximum (n,) of at most about ``points`` bins."""
         at, low, high = self.extremes(name, start, stop, points)
         rest = self.rest.reading if name == "displacement" else 0.0
-        return at / self.rate, low - rest, high - rest
+        return (at + self._first) / self.rate, low - rest, high - rest

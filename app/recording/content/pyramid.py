@@ -13,6 +13,8 @@ __all__ = ["BINS", "PyramidWriter", "complete_pyramid", "levels", "reduced"]
 BINS = (64, 4096, 262144)
 #: s of a run in one chunk of a level, within 64 to 16384 bins.
 CHUNK = 4.0
+#: Types of counts, and of their sums.
+_KINDS = (np.dtype(np.int16), np.dtype(np.int32))
 
 
 def _name(bin_samples: int) -> str:
@@ -22,10 +24,11 @@ def _name(bin_samples: int) -> str:
 class PyramidWriter:
     """The levels under ``entry/pyramid`` of a run of ``channels`` channels at ``rate`` Hz.
 
-    Each is (bins, channels, 2) int16: minimum and maximum of the counts of every full bin.
+    Each is (bins, channels, 2) of the ``kind`` of the counts: minimum and maximum of the counts of
+    every full bin.
     """
 
-    def __init__(self, entry: h5py.Group, channels: int, rate: float) -> None:
+    def __init__(self, entry: h5py.Group, channels: int, rate: float, kind: np.dtype) -> None:
         group = entry.create_group("pyramid")
         self._datasets = []
         for size in BINS:
@@ -36,13 +39,13 @@ class PyramidWriter:
                     shape=(0, channels, 2),
                     maxshape=(None, channels, 2),
                     chunks=(rows, channels, 2),
-                    dtype="<i2",
+                    dtype=kind,
                 )
             )
             self._datasets[-1].attrs["bin_samples"] = size
         # for each level, the counts or the bins of the level below that do not fill a bin yet
-        self._low = [np.empty((channels, 0), dtype=np.int16) for _ in BINS]
-        self._high = [np.empty((channels, 0), dtype=np.int16) for _ in BINS]
+        self._low = [np.empty((channels, 0), dtype=kind) for _ in BINS]
+        self._high = [np.empty((channels, 0), dtype=kind) for _ in BINS]
         self._pending: list[list[np.ndarray]] = [[] for _ in BINS]
 
     def move_to(self, entry: h5py.Group) -> None:
@@ -89,7 +92,7 @@ def levels(entry: h5py.Group, samples: int) -> dict[int, h5py.Dataset]:
     found = {}
     for size in BINS:
         level = group.get(_name(size))
-        usable = isinstance(level, h5py.Dataset) and level.ndim == 3 and level.dtype == np.int16
+        usable = isinstance(level, h5py.Dataset) and level.ndim == 3 and level.dtype in _KINDS
         # after a kill a level can be a block behind the counts
         if usable and level.shape[0] >= samples // size:
             found[size] = level

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
+from dearig.recording.content.layout import AVERAGE_COLUMN
 from dearig.recording.exporters.table import Exporter, columns_of
 from dearig.recording.reading.recording import Recording
 
@@ -15,6 +18,8 @@ BATCH = 20_000
 
 def _write(recording: Recording, path: Path) -> None:
     columns = columns_of(recording)
+    if recording.average > 1:  # a CSV file has no other place for it
+        columns[AVERAGE_COLUMN] = np.full(recording.samples, recording.average)
     with path.open("w", encoding="utf-8", newline="") as stream:
         stream.write(",".join(columns) + "\n")
         for first in range(0, recording.samples, BATCH):

@@ -70,6 +70,7 @@ def description_of(recording: Recording) -> dict[str, str]:
         "name": recording.name,
         "kind": recording.kind,
         "kinematics": recording.kinematics,
+        "average": str(recording.average),
         "hold": ZERO_ORDER if recording.hold else LINEAR,
         "complete": str(recording.complete).lower(),
         "film": json.dumps(asdict(recording.film)) if recording.film else "",

@@ -39,6 +39,7 @@ class Exported:
     """
 
     hold: bool = False
+    average: int = 1
     kinematics: str | None = None
     film: Film | None = None
     load: Load | None = None
@@ -57,6 +58,7 @@ def exported(about: Mapping[str, str]) -> Exported:
     noted = _noted(about.get("provenance", ""))
     return Exported(
         hold=about.get("hold") == ZERO_ORDER,
+        average=_whole(about.get("average", "")),
         kinematics=kinematics if kinematics in KINEMATICS else None,
         film=_made(Film, about.get("film", "")),
         load=_made(Load, about.get("load", "")),
@@ -66,6 +68,11 @@ def exported(about: Mapping[str, str]) -> Exported:
         events=tuple(_events(about.get("events", ""))),
         started=_started(noted),
     )
+
+
+def _whole(text: str) -> int:
+    """Return a whole number of 1 or more; 1 for any other text."""
+    return max(int(text), 1) if text.isascii() and text.isdigit() and len(text) < 10 else 1
 
 
 def _number(text: str) -> float | None:

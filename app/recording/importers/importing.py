@@ -14,6 +14,7 @@ from dearig.errors import InputError, Note, hints_of
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.progress import Progress, part, quiet
 from dearig.recording.content.assumed import ASSUMED, FILM_VALUES, assumed_of
+from dearig.recording.content.layout import AVERAGE_COLUMN
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.provenance import FROM_IMPORT, START_FROM
 from dearig.recording.content.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
@@ -33,7 +34,7 @@ from dearig.recording.importers.columns.values import Values, values_of
 from dearig.recording.importers.exported import exported
 from dearig.recording.importers.quantities.units import UnitScale
 from dearig.recording.importers.registry import source_at
-from dearig.recording.importers.source import NeedsOptionError
+from dearig.recording.importers.source import NeedsOptionError, Source
 from dearig.recording.writing.save import save_recording
 
 __all__ = [
@@ -120,6 +121,7 @@ class Prepared:
     values: Values
     metadata: RunMetadata
     hold: bool
+    average: int
     kinematics: str | None
     rest_reading: float
     events: tuple[Event, ...]
@@ -172,6 +174,7 @@ def import_file(
         found.values.columns,
         found.metadata,
         hold=found.hold,
+        average=found.average,
         kinematics=found.kinematics,
         rest_reading=found.rest_reading,
         events=found.events,
@@ -220,6 +223,7 @@ def prepare(
             raise
     progress("checking", READ)
     was = exported(table.about)
+    average = max(was.average, _average_of(table))
     noted = _provenance(path, digest.result(), chosen, options)
     start = values.start
     if was.started is not None:
@@ -245,11 +249,29 @@ def prepare(
             provenance=noted,
         ),
         hold=was.hold and values.kind == "actuator",
+        average=average,
         kinematics=kinematics or (None if values.kind == "actuator" else "uniaxial"),
         rest_reading=rest,
         events=tuple(_events(values, was.events)),
         start=start,
     )
+
+
+def _average_of(table: Source) -> int:
+    """Return how many conversions each row is the mean of, as an exported table says it; else 1.
+
+    Raises ``InputError`` for a column of that name which is not one whole number.
+    """
+    if AVERAGE_COLUMN not in table.names:
+        return 1
+    values = table.read([AVERAGE_COLUMN])[AVERAGE_COLUMN]
+    first = float(values[0]) if values.size else 1.0
+    if not (first >= 1.0 and first.is_integer() and (values == first).all()):
+        raise InputError(
+            f"{table.path}: the column {AVERAGE_COLUMN} must hold one whole number of 1 or more in "
+            f"all rows: the number of conversions whose mean a row is"
+        )
+    return int(first)
 
 
 def _typed(options: ImportOptions) -> list[tuple[str, str | float]]:

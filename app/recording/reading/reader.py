@@ -22,7 +22,13 @@ from dearig.recording.content.layout import (
     counts_name,
     declared_names,
 )
-from dearig.recording.content.physical import Counts, Rest, read_channels, resolution
+from dearig.recording.content.physical import (
+    Counts,
+    Rest,
+    average_of,
+    read_channels,
+    resolution,
+)
 from dearig.recording.content.provenance import read_provenance
 from dearig.recording.content.safe import dataset, group, item
 from dearig.recording.content.sample import read_film, read_load
@@ -132,7 +138,8 @@ class _Reader:
         kinematics = self._kinematics(data, film)
         skew, delay, delay_error = self._timing(data)
         expected = data.attrs.get("samples_expected")
-        step = {c.name: resolution(c) for c in channels}.get("voltage_command", 0.0)
+        average = average_of(data)
+        step = {c.name: resolution(c, average) for c in channels}.get("voltage_command", 0.0)
         complete = bool(entry.attrs.get("complete", False))
         return Recording(
             path=self.path,
@@ -140,6 +147,7 @@ class _Reader:
             name=self.path.stem,
             arrays=Arrays(self.path, stored, derived, samples, rest, identifier_of(entry)),
             rate=rate,
+            average=average,
             title=self._text(entry, "title"),
             hold=kind == "actuator" and self._hold(data),
             kinematics=kinematics,

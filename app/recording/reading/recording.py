@@ -61,8 +61,10 @@ class Recording:
     conversion of the sensor, ``displacement_delay`` in s the sensor's own lag, known within
     ``displacement_delay_error``; neither has been subtracted from ``time``. ``temperature`` is in
     degrees Celsius. ``complete`` is False for a run that was killed; ``outcome`` says how it ended.
-    ``rate`` in Hz is that of the sample clock, None for data without one. ``environment`` are the
-    readings of a thermo-hygrometer, None for a run without one. ``texts`` has film, notes and
+    ``rate`` in Hz is that of the samples, None for data without a sample clock. Each sample is the
+    mean of ``average`` conversions, spread evenly over its interval, and its time is the mean of
+    their ticks: the converter held the voltage for one conversion after each. ``environment`` are
+    the readings of a thermo-hygrometer, None for a run without one. ``texts`` has film, notes and
     others by the keys of ``content.fields.TEXTS``.
     """
 
@@ -75,6 +77,7 @@ class Recording:
     kinematics: str
     complete: bool
     rate: float | None = None
+    average: int = 1
     displacement_skew: float = 0.0
     displacement_delay: float = 0.0
     displacement_delay_error: float = 0.0
@@ -316,6 +319,7 @@ class Recording:
         about = {
             "title": self.title, "name": self.name, "kind": self.kind, "film_id": self.film_id,
             "outcome": self.outcome, "start_time": str(self.provenance.get("start_time", "")),
+            "average": self.average,
         }  # fmt: skip
         columns = {
             name: ("time", values.copy(), self._attributes(name))
@@ -335,6 +339,7 @@ class Recording:
         columns = {name: values.copy() for name, values in self.values.items()}
         index = lib.Index(columns.pop("time"), name="time")
         frame: pandas.DataFrame = lib.DataFrame(columns, index=index)
+        frame.attrs["average"] = self.average
         frame.attrs["units"] = {name: self.unit(name) for name in self.arrays.names}
         return frame
 

@@ -58,6 +58,7 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
         "samples_expected": recording.samples_expected,
         "duration_s": recording.duration,
         "timing": timing,
+        "average": recording.average,
         "hold": ZERO_ORDER if recording.hold else LINEAR,
         "kinematics": recording.kinematics,
         "channels": [
@@ -166,6 +167,8 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
         rows.append(
             ("rate", f"uneven, steps of {timing['step_min_s']:.4g} to {timing['step_max_s']:.4g} s")
         )
+    if recording.average > 1:
+        rows.append(("row", f"mean of {recording.average} conversions"))
     for channel in d["channels"]:
         scale, unit = _READABLE.get(channel["name"], (1.0, channel["unit"]))
         if channel["min"] is not None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dearig.errors import InputError
+from dearig.recording.content.layout import counts_type
 from dearig.recording.files import errno_of, in_words
 from dearig.recording.lock import NO_LOCKS
 from dearig.recording.writing.finish import OVERVIEW, PHYSICAL_MAX
@@ -20,8 +21,8 @@ LEFT_FREE = 2**26
 
 #: Metadata, texts and the first chunks of everything.
 FIXED = 200_000
-#: Bytes for each count: the count itself, minima and maxima over bins, checksums, indexes.
-PER_COUNT = 2.0 * (1.0 + 2.0 / 64.0 + 2.0 / 4096.0 + 0.001)
+#: Times the bytes of a count: the count itself, minima and maxima over bins, checksums, indexes.
+PER_COUNT = 1.0 + 2.0 / 64.0 + 2.0 / 4096.0 + 0.001
 
 #: Error number of the operating system: what happened, and what to do.
 _ADVICE = MappingProxyType(
@@ -45,12 +46,13 @@ _ADVICE = MappingProxyType(
 )
 
 
-def estimate_bytes(channels: int, rate: float, samples: int) -> int:
+def estimate_bytes(channels: int, rate: float, samples: int, average: int = 1) -> int:
     """Return the bytes that a run of ``samples`` samples of ``channels`` channels needs.
 
-    The clock has ``rate`` Hz. At no time from the first block to the finished file it is larger.
+    They come at ``rate`` Hz, each the mean of ``average`` conversions. At no time from the first
+    block to the finished file it is larger.
     """
-    size = FIXED + PER_COUNT * channels * samples
+    size = FIXED + PER_COUNT * counts_type(average).itemsize * channels * samples
     # computer's clock and events
     size += 100.0 * samples / rate
     if samples <= PHYSICAL_MAX:
@@ -72,9 +74,11 @@ def free_bytes(path: str | Path) -> int:
         raise InputError(f"the disk of {path} does not answer: {in_words(error)}") from error
 
 
-def check_room(path: str | Path, channels: int, rate: float, samples: int) -> None:
+def check_room(
+    path: str | Path, channels: int, rate: float, samples: int, average: int = 1
+) -> None:
     """Raise ``InputError`` unless such a run fits on the disk of ``path``."""
-    needed, free = estimate_bytes(channels, rate, samples), free_bytes(path)
+    needed, free = estimate_bytes(channels, rate, samples, average), free_bytes(path)
     if needed + LEFT_FREE > free:
         raise InputError(
             f"the run needs {_size(needed)} and the disk of {path} has {_size(free)} free, of "

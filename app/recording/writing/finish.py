@@ -15,6 +15,7 @@ from dearig.recording.content.flushes import flush_notes
 from dearig.recording.content.journal import Patched, changed_in_place, replaced
 from dearig.recording.content.layout import (
     LIBVER,
+    LINEAR,
     MESSAGE_BYTES,
     SIGNALS,
     ZERO_ORDER,
@@ -154,7 +155,8 @@ def _write_physical(entry: h5py.Group) -> int:
         for start in range(0, samples, SLICE):
             stop = min(start + SLICE, samples)
             field[start:stop] = counts.window(name, start, stop)
-    data["voltage_command"].attrs["hold"] = fixed(ZERO_ORDER)
+    held = ZERO_ORDER if counts.average == 1 else LINEAR
+    data["voltage_command"].attrs["hold"] = fixed(held)
     data["displacement"].attrs["rest_reading"] = rest.reading
     data["displacement"].attrs["rest_samples"] = rest.samples
     return samples

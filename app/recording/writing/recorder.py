@@ -36,7 +36,6 @@ LOOK_INTERVAL = 1.0
 POLL = 0.1
 
 _THREAD = "recording"
-_COUNT_BYTES = 2
 
 
 def is_writing() -> bool:
@@ -92,7 +91,7 @@ class Recorder:
         self._waits = waits
         self._hurried = hurried
         self._clock = clock
-        second = _COUNT_BYTES * writer.channels * writer.rate_Hz
+        second = writer.count_bytes * writer.channels * writer.rate_Hz
         self._bytes_max = int(second * HOLDS)
         self._bytes_last = int(second * (HOLDS + ramp_s + LAST_BLOCKS))
         self._looked = clock()
@@ -220,7 +219,7 @@ class Recorder:
 
     def _behind(self) -> str:
         rate = self._writer.rate_Hz
-        late = self._bytes / (_COUNT_BYTES * self._writer.channels * rate)
+        late = self._bytes / (self._writer.count_bytes * self._writer.channels * rate)
         return (
             f"the disk of {self._writer.path.absolute().parent} is {late:.3g} s behind the run, "
             f"and no more samples fit into memory: it does not answer, or it is too slow; see that "

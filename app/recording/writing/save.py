@@ -26,6 +26,7 @@ from dearig.recording.content.layout import (
     name_dimensions,
 )
 from dearig.recording.content.metadata import RunMetadata
+from dearig.recording.content.physical import write_average
 from dearig.recording.content.provenance import gather, write_provenance
 from dearig.recording.content.sample import write_sample
 from dearig.recording.content.text import clip_text, fixed, put_text
@@ -46,6 +47,7 @@ def save_recording(
     metadata: RunMetadata,
     *,
     hold: bool = False,
+    average: int = 1,
     kinematics: str | None = None,
     rest_reading: float = 0.0,
     events: Iterable[Event] = (),
@@ -57,10 +59,10 @@ def save_recording(
     """Write arrays as a recording.
 
     ``values`` are (N,) each, by their names in ``layout.UNITS`` and in those units. ``kind`` is
-    actuator or film, ``hold`` and ``kinematics`` are as in ``Recording``, ``rest_reading`` in m has
-    been subtracted from the displacement. ``started`` is the Unix time in s of the first sample, by
-    default ``now()``. ``progress`` gets the part that is written. The file
-    appears complete or not at all. Raises ``InputError`` if it may not be written, and
+    actuator or film, ``hold``, ``average`` and ``kinematics`` are as in ``Recording``,
+    ``rest_reading`` in m has been subtracted from the displacement. ``started`` is the Unix time in
+    s of the first sample, by default ``now()``. ``progress`` gets the part that is written. The
+    file appears complete or not at all. Raises ``InputError`` if it may not be written, and
     ``ValueError`` for values that no recording of that kind has.
     """
     if kind not in KINDS:
@@ -89,6 +91,7 @@ def save_recording(
                 progress("writing", (number + first / size) / len(values))
                 field[first : first + WRITTEN] = numbers[first : first + WRITTEN]
         attach_time(data)
+        write_average(data, average)
         if kinematics is not None:
             data.attrs["kinematics"] = fixed(kinematics)
         if kind == "actuator":

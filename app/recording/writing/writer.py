@@ -35,17 +35,19 @@ from dearig.recording.content.layout import (
     EVENT_TYPE,
     IDENTIFIER,
     LIBVER,
+    LINEAR,
     MESSAGE_BYTES,
     WALL_CLOCK_TYPE,
     ZERO_ORDER,
     counts_name,
+    counts_type,
     lay_out,
     make_own_scale,
     show_plot,
 )
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.modelled import ModelledWriter
-from dearig.recording.content.physical import Counts, Rest, write_channel
+from dearig.recording.content.physical import Counts, Rest, write_average, write_channel
 from dearig.recording.content.provenance import CONTINUES, gather, write_provenance
 from dearig.recording.content.pyramid import PyramidWriter
 from dearig.recording.content.run_layout import check_channels, sequence_name, write_instruments
@@ -80,15 +82,16 @@ ROOM_LEFT = 2**21
 class RecordingWriter:
     """Writer of one run to ``path``; a context manager.
 
-    ``identity`` names the channels in the order of the blocks. ``rate_Hz`` is that of the sample
-    clock. ``samples_expected`` is only stored, so that a reader sees how many samples are missing.
-    Without a title in ``metadata`` the run takes the name of its sequence, without a seed that of
-    the identity. With ``overlay`` every block comes with the displacement of an overlay model; the
-    metadata's ``model_toml`` has its parameters. With ``environment`` there are readings of a
-    thermo-hygrometer, see ``room``. ``now`` returns Unix time in s. With ``fsync``
-    every flush reaches the disk, so that flushed samples survive a power cut. A recording that is
-    overwritten stays until the first flush of samples, as ``FILE.h5.old``. ``first_sample`` is that
-    of a run which has begun in another file; there its ``rest`` was measured.
+    ``identity`` names the channels in the order of the blocks. ``rate_Hz`` is that of the rows,
+    each of which holds sums of ``average`` counts. ``samples_expected`` is only stored, so that a
+    reader sees how many samples are missing. Without a title in ``metadata`` the run takes the name
+    of its sequence, without a seed that of the identity. With ``overlay`` every block comes with
+    the displacement of an overlay model; the metadata's ``model_toml`` has its parameters. With
+    ``environment`` there are readings of a thermo-hygrometer, see ``room``. ``now`` returns Unix
+    time in s. With ``fsync`` every flush reaches the disk, so that flushed samples survive a power
+    cut. A recording that is overwritten stays until the first flush of samples, as ``FILE.h5.old``.
+    ``first_sample`` is that of a run which has begun in another file; there its ``rest`` was
+    measured.
 
     Raises ``InputError`` before anything is changed if the file exists (unless ``overwrite``), its
     folder does not, or the sequence is not TOML. ``ValueError`` is a programming error.
@@ -102,6 +105,7 @@ class RecordingWriter:
         samples_expected: int,
         metadata: RunMetadata,
         *,
+        average: int = 1,
         overwrite: bool = False,
         fsync: bool = False,
         overlay: bool = False,
@@ -124,17 +128,18 @@ class RecordingWriter:
         self._first = first_sample
         self._rest = rest
         self._command = [c.name for c in identity.channels].index("voltage_command")
-        self._at_rest: np.int16 | None = None  # count of the command at the first sample
+        self._at_rest: np.integer | None = None  # count of the command at the first sample
         self._driven = False  # True once the lead-in at 0 V has ended
         self._lost: LostFile | None = None
         self._size = 0  # bytes after the last flush
-        self._rate = float(rate_Hz)
+        self._rate, self._average = float(rate_Hz), average
+        self._type = counts_type(average)
         self._now = now
         self._fsync = fsync
         self._written = self._flushed = self._recorded_events = 0
         self._dirty = False
         self._closed = False
-        self._margin = int(ROOM_LEFT + 2.0 * self._rate * len(identity.channels))
+        self._margin = int(ROOM_LEFT + self._type.itemsize * self._rate * len(identity.channels))
         self._failure: DiskFault | None = None
 
         started = now()
@@ -215,6 +220,7 @@ class RecordingWriter:
     def _lay_out_run(self, entry: h5py.Group) -> None:
         data = entry["data"]
         data.attrs["rate_Hz"] = self._rate
+        write_average(data, self._average, self._rate * self._average)
         data.attrs["samples_expected"] = int(self._expected)
         # about one second: every flush writes a changed chunk again
         self._chunk = chunk = int(min(max(self._rate, 1024), 65536))
@@ -225,11 +231,12 @@ class RecordingWriter:
                 shape=(0,),
                 maxshape=(None,),
                 chunks=(chunk,),
-                dtype="<i2",
+                dtype=self._type,
             )
             write_channel(counts, channel, place)
             if channel.name == "voltage_command":
-                counts.attrs["hold"] = fixed(ZERO_ORDER)
+                # between means of a voltage that moves in small steps, a line is nearer to it
+                counts.attrs["hold"] = fixed(ZERO_ORDER if self._average == 1 else LINEAR)
             if channel.name == "displacement" and self._rest is not None:
                 counts.attrs["rest_reading"] = self._rest.reading
                 counts.attrs["rest_samples"] = self._rest.samples
@@ -237,7 +244,7 @@ class RecordingWriter:
         self._events = entry.create_dataset(
             "events", shape=(0,), maxshape=(None,), chunks=(32,), dtype=EVENT_TYPE
         )
-        self._pyramid = PyramidWriter(entry, len(self._channels), self._rate)
+        self._pyramid = PyramidWriter(entry, len(self._channels), self._rate, self._type)
         self._checksums = ChecksumWriter(entry, len(self._channels), self._rate)
         self._environment = EnvironmentWriter(entry) if self._has_environment else None
         # created last: a flush writes datasets in this order and stops where the disk refuses one,
@@ -260,6 +267,11 @@ class RecordingWriter:
     def channels(self) -> int:
         """Number of channels of a block."""
         return len(self._channels)
+
+    @property
+    def count_bytes(self) -> int:
+        """Bytes of one count of a block."""
+        return self._type.itemsize
 
     @property
     def rate_Hz(self) -> float:  # noqa: N802
@@ -292,9 +304,9 @@ class RecordingWriter:
         Raises ``DiskFault`` if the disk cannot be written.
         """
         counts = block.counts
-        if counts.ndim != 2 or counts.shape[0] != len(self._channels) or counts.dtype != np.int16:
+        if counts.ndim != 2 or counts.shape[0] != len(self._channels) or counts.dtype != self._type:
             raise ValueError(
-                f"a block holds int16 counts ({len(self._channels)}, n), "
+                f"a block holds {self._type} counts ({len(self._channels)}, n), "
                 f"not {counts.dtype} {counts.shape}"
             )
         due = self._first + self._written
@@ -418,6 +430,7 @@ class RecordingWriter:
             self._rate,
             max(self._expected - (first_sample - self._first), 0),
             replace(self._metadata, provenance={**self._metadata.provenance, **from_here}),
+            average=self._average,
             fsync=self._fsync,
             overlay=self._overlay,
             environment=self._has_environment,

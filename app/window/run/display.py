@@ -187,7 +187,7 @@ class RunDisplay(QWidget):
         step = self.plots.step_of(shown) if following else 0
         frame = (now.revision, self.plots.span_s, at, step, self._running)
         if frame == self._drawn:
-            self.plots.scroll(shown)
+            self.plots.flow(shown)
             return
         self._drawn = frame
         self.plots.draw(live, end, shown)

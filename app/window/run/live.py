@@ -100,7 +100,7 @@ class Live(RunObserver):
     # called from the rig's thread
 
     def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
-        run = _Run(planned.samples, identity.channels, rate)
+        run = _Run(planned.rows, identity.channels, rate, planned.average)
         run.follow(*self._wanted)
         self._run = run
         self._thread = threading.Thread(target=self._work, name="live", daemon=True)
@@ -236,7 +236,10 @@ class _Model:
 class _Run:
     """Curves and models of one run; ``show`` and readers are called under the lock."""
 
-    def __init__(self, total: int, channels: tuple[Channel, ...], rate: float) -> None:
+    def __init__(
+        self, total: int, channels: tuple[Channel, ...], rate: float, average: int
+    ) -> None:
+        self.average = average
         self.total = total
         self.channels = channels
         self.rate = rate
@@ -256,7 +259,7 @@ class _Run:
         for i, chosen in enumerate(overlays):
             overlay, words = None, ""
             try:
-                overlay = Overlay(chosen.actuator, self.channels, self.rate, drive)
+                overlay = Overlay(chosen.actuator, self.channels, self.rate, drive, self.average)
             except (ModelError, ValueError) as error:
                 words = str(error)
             models.append(_Model(overlay, words, self.rate))
@@ -271,7 +274,7 @@ class _Run:
         In a run of which the first blocks are no longer kept, only models that are simulated
         already go on.
         """
-        fresh = _Run(self.total, self.channels, self.rate)
+        fresh = _Run(self.total, self.channels, self.rate, self.average)
         fresh.revision = self.revision + 1
         if self._blocks is not None:
             fresh.follow(overlays, drive)

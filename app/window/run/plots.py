@@ -267,7 +267,7 @@ class RunPlots(QWidget):
     def step_of(self, shown: float) -> int:
         """Return the pixel that a run which is shown up to ``shown`` s has come to.
 
-        It is 0 once the time axis moves: then ``scroll`` shows what comes.
+        It is 0 once the time axis moves: then ``flow`` shows what comes.
         """
         if self._moves(shown):
             return 0
@@ -278,7 +278,7 @@ class RunPlots(QWidget):
         """Return the s up to which curves are drawn of a run that has come to ``end`` s."""
         return end if self._moves(shown) else shown
 
-    def scroll(self, shown: float) -> None:
+    def flow(self, shown: float) -> None:
         """Move the time axis to ``shown`` s, below curves that are drawn already."""
         span = self._span(shown)
         if self._moves(shown) and self.area.following and self.area.span() != span:

@@ -108,7 +108,7 @@ def make_preview(
     toml: str, folder: Path, rig_file: RigFile, film: str = "", progress: Progress = quiet
 ) -> Preview:
     """Plan the sequence ``toml``; all faults in it become ``Preview.faults``."""
-    rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
+    rate, limits = rig_file.card.conversion_rate_Hz, rig_file.gate_limits()
     try:
         loaded, faults = read_sequence(toml, "the sequence", folder)
     except InputError as error:

@@ -65,7 +65,7 @@ class Wiring:
 
     def warm_up(self) -> None:
         """Compute two samples, so that the kernels are compiled before a client waits for 0 V."""
-        rate = self._settings.card.sample_rate_Hz
+        rate = self._settings.card.conversion_rate_Hz
         wired = [t for n, t in self._settings.terminals().items() if n != "voltage_command"]
         inputs = [AnalogInput(t, t, (-10.0, 10.0), 10.0, 0) for t in wired]
         skews = [self._settings.skew(place) for place in range(len(inputs))]

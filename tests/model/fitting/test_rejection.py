@@ -26,6 +26,20 @@ def test_noise_as_that_at_rest_is_rarely_rejected(noise):
     assert sum(map(is_rejected, found)) <= 2
 
 
+def test_a_faint_colour_of_means_that_the_rest_does_not_show_is_no_misfit():
+    # means over 1 ms of a sensor that averages over 0.32 ms: neighbours correlate by 0.06
+    rng = np.random.default_rng(7)
+
+    def means(n):
+        return lfilter([1.0, 0.06], [1.0], rng.standard_normal(n + 1))[1:]
+
+    cases = [(means(25_000), means(2000)) for _ in range(50)]
+    assert sum(is_rejected(misfit_p(*case, averaged=True)) for case in cases) <= 1
+    assert sum(is_rejected(misfit_p(*case)) for case in cases) > 10  # as if it had to be white
+    wave = 2.0 * np.sin(np.linspace(0.0, 300.0, 25_000))
+    assert is_rejected(misfit_p(cases[0][0] + wave, cases[0][1], averaged=True))
+
+
 @pytest.mark.parametrize(
     ("kind", "over"), [*((kind, 3.0) for kind in NOISES), ("white", 1.14), ("of heavy tails", 1.28)]
 )
