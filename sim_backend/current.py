@@ -82,6 +82,29 @@ def _deliver(
     state[0], state[1] = gap, ahead
 
 
+@jit
+def _add_flow(
+    charge: np.ndarray,
+    charging: np.ndarray,
+    conduction: np.ndarray,
+    interval: float,
+    into: float,
+    current: np.ndarray,
+) -> None:
+    """Add to ``current`` (M,) A what flows between the steps, ``into`` s into each interval.
+
+    The charging current is the parabola with its values at both ends, whose integral is the change
+    of the charge.
+    """
+    x = into / interval
+    for k in range(current.shape[0]):
+        first, last = charging[0, k], charging[1, k]
+        mean = (charge[1, k] - charge[0, k]) / interval
+        current[k] += first * (1.0 - x) + last * x
+        current[k] += 6.0 * x * (1.0 - x) * (mean - 0.5 * (first + last))
+        current[k] += conduction[0, k] * (1.0 - x) + conduction[1, k] * x
+
+
 @dataclass(frozen=True)
 class CurrentState:
     """State of the current monitor between two chunks.
@@ -119,13 +142,14 @@ class CurrentMonitor:
         tau = self._tau + electricity.lag
         step = electricity.step
         current, film = self._pulses(step, tau, slew * capacitance, into, state.film)
-        # one interval has one current on average, and the charge is its integral
-        x = max(into - self._blur, 0.0) / self._spacing
-        first, last = electricity.charging
-        mean = (electricity.charge[1] - electricity.charge[0]) / self._spacing
-        bulge = 6.0 * x * (1.0 - x) * (mean - 0.5 * (first + last))
-        lost = electricity.conduction[0] * (1.0 - x) + electricity.conduction[1] * x
-        current += first * (1.0 - x) + last * x + bulge + lost
+        _add_flow(
+            electricity.charge,
+            electricity.charging,
+            electricity.conduction,
+            self._spacing,
+            max(into - self._blur, 0.0),
+            current,
+        )
 
         output, cable = electricity.output, state.cable
         if self._cable > 0.0:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dearig.model import kernel
+from dearig.model.compiled.jit import jit
 from dearig.model.effects import EFFECTS, SENSOR_MEMORY
 from dearig.model.readings.environment import CELSIUS, HUMIDITY
 from dearig.model.simulation.actuator import (
@@ -21,6 +22,29 @@ from dearig.model.simulation.actuator import (
 from dearig.sim_backend.plant import Air, Electricity, Motion
 
 __all__ = ["ModelPlant"]
+
+
+@jit
+def _charge(
+    time: np.ndarray,
+    capacitance: np.ndarray,
+    ends: np.ndarray,
+    before: float,
+    charge: np.ndarray,
+    step: np.ndarray,
+    charging: np.ndarray,
+) -> None:
+    """Fill ``Electricity`` of a ``capacitance`` (N,) F under ``ends`` (2, N - 1) V.
+
+    ``before`` C is the charge before the first step. The charging current is the mean over an
+    interval.
+    """
+    for k in range(step.shape[0]):
+        first, last = capacitance[k] * ends[0, k], capacitance[k + 1] * ends[1, k]
+        charge[0, k], charge[1, k] = first, last
+        step[k] = first - before
+        charging[0, k] = charging[1, k] = (last - first) / (time[k + 1] - time[k])
+        before = last
 
 
 @dataclass(frozen=True)
@@ -105,17 +129,10 @@ class ModelPlant:
     def _electricity(self, time: np.ndarray, ends: np.ndarray, stretch: np.ndarray) -> Electricity:
         """Return the electricity under ``ends`` (2, N - 1) V along ``stretch`` (N,)."""
         capacitance = self.actuator.film.capacitance(stretch)
-        charge = np.stack((capacitance[:-1], capacitance[1:])) * ends
-        mean = (charge[1] - charge[0]) / np.diff(time)
-        return Electricity(
-            shown=ends,
-            output=ends,
-            voltage=ends,
-            charge=charge,
-            step=charge[0] - np.append(self.charge, charge[1, :-1]),
-            charging=np.stack((mean, mean)),
-            conduction=np.zeros_like(ends),
-        )
+        charge, charging = np.empty(ends.shape), np.empty(ends.shape)
+        step = np.empty(ends.shape[1])
+        _charge(time, capacitance, ends, self.charge, charge, step, charging)
+        return Electricity(ends, ends, charge, step, charging, np.zeros(ends.shape))
 
     def _air(self, time: np.ndarray) -> np.ndarray:
         """Return the air at ``time`` (N,) s above that of the start, as the kernel takes it."""

@@ -15,17 +15,16 @@ class Electricity:
     """What the circuit of the film does in M intervals, in each of which the supply is held.
 
     Arrays are (2, M) unless said otherwise. Their rows are the values at the start of an interval,
-    after the step of the supply, and at its end. ``shown`` V is the output as the amplifier's own
-    voltage monitor sees it, ``output`` V what the amplifier puts out, ``voltage`` V that at the
-    film, ``charge`` C on the film. ``charging`` A changes this charge between two steps,
-    ``conduction`` A is lost through the film.
+    after the step of the supply, and at its end. ``output`` V is what the amplifier puts out,
+    ``voltage`` V that at the film, ``charge`` C on the film. ``charging`` A changes this charge
+    between two steps, ``conduction`` A is lost through the film. ``shown`` V is the output as the
+    amplifier's own voltage monitor sees it; None where that sees no hidden fault.
 
     ``step`` (M,) C is the charge that flows at once at the start of an interval; where a resistance
     of the law is in series, it flows within ``lag`` s. The rest of the change of the charge is cut
     off from the amplifier: a torn electrode takes it away.
     """
 
-    shown: np.ndarray
     output: np.ndarray
     voltage: np.ndarray
     charge: np.ndarray
@@ -33,6 +32,7 @@ class Electricity:
     charging: np.ndarray
     conduction: np.ndarray
     lag: float = 0.0
+    shown: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

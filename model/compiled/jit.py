@@ -34,6 +34,7 @@ from dearig.model.compiled.plugins import entry_points_found, source_files
 from dearig.model.compiled.trusted_folder import CacheFolder, cache_root, distrust_content, usable
 
 __all__ = [
+    "INTO_CALLER",
     "allocating",
     "cache_folder",
     "cache_note",
@@ -142,6 +143,9 @@ _options: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract", "arcp", "nsz", "reassoc"},
 }
+
+#: The same of what becomes a part of its callers' machine code (``numba.extending.overload``).
+INTO_CALLER = {**_options, "_nrt": False, "forceinline": True}
 
 # To the type checker a compiled function is the function that it was compiled from: it takes the
 # same arguments and returns the same values.

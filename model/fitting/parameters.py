@@ -48,6 +48,11 @@ NORMAL_95 = 1.959963984540054
 
 # Lower ends for logarithmic coordinates; below, a spring or branch has no measurable influence.
 _FLOOR = {"mu": 1e-2, "T": 1e-6}
+# Increments of films in common steps, relative: of one-sided differences, whose error is about half
+# of them, and of central ones. Rounding adds some 1e-11 over the increment.
+_SPRINGS_ONE_SIDED, _SPRINGS_CENTRAL = 1e-5, 1e-4
+_LIMITS_IN_COMMON = 10.0  # times that: limits hardly change a reading
+_EFFECTS_IN_COMMON = 0.1  # of those of films in steps of their own
 _PERMITTIVITY_RANGE = (1.0, 100.0)  # relative: of vacuum, and above that of any elastomer
 
 
@@ -271,13 +276,23 @@ class FitLayout:
         )
         return np.where(self._log, 3.0, linear)
 
-    def differences(self, x: np.ndarray) -> np.ndarray:
-        """Steps (d,) for difference quotients at coordinates ``x``."""
+    def differences(
+        self, x: np.ndarray, in_common: bool = False, central: bool = False
+    ) -> np.ndarray:
+        """Steps (d,) for difference quotients at coordinates ``x``.
+
+        Of films that are simulated ``in_common`` steps they are shorter: such films differ by no
+        noise of their own steps. There ``central`` differences take longer ones than one-sided.
+        """
         # effects have kinks, so differences must be wide enough to cross them; with hysteresis a
         # small shift of a turning point changes the ringing after it
         springs = 1e-3 if self.base.effects else 1e-4
         if any_hysteretic(self.base.effects):
             springs = 3e-3
+        shorter, limits = 1.0, 1.0
+        if in_common:
+            springs = _SPRINGS_CENTRAL if central else _SPRINGS_ONE_SIDED
+            shorter, limits = _EFFECTS_IN_COMMON, _LIMITS_IN_COMMON
         moduli = springs * np.maximum(np.abs(x), 1e-3 * self.reach(x))
         # but not across an instant or a spectral line
         placed = [
@@ -286,8 +301,11 @@ class FitLayout:
             for q in self.quantities
         ]
         sizes = np.maximum(np.where(placed, 0.0, 1e-3 * np.abs(x)), 0.02 * self._typical)
+        sizes *= np.where(placed, 1.0, shorter)
         linear = np.where(self._typical > 0.0, sizes, moduli)
-        return np.where(self._log, np.where(self._typical > 0.0, 2e-2, springs), linear)
+        logarithmic = np.where(self.shapes, springs * limits, springs)
+        logarithmic = np.where(self._typical > 0.0, 2e-2 * shorter, logarithmic)
+        return np.where(self._log, logarithmic, linear)
 
     def initial(self) -> np.ndarray:
         """Return natural values (d,) of the base, inside the bounds."""

@@ -8,14 +8,16 @@ from copy import copy
 import numpy as np
 
 from dearig.model import kernel
+from dearig.model.compiled.packs import WIDTH
 from dearig.model.effects import EFFECTS, SENSOR_COLUMNS
 from dearig.model.errors import ModelError
 from dearig.model.fitting.drift import DriftFit, record_drift
+from dearig.model.fitting.neighbours import readings_of_neighbours
 from dearig.model.fitting.offsets import Offsets
 from dearig.model.fitting.parallel import parallel_map
 from dearig.model.fitting.parameters import FitLayout
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
-from dearig.model.simulation.actuator import Actuator, readings_of
+from dearig.model.simulation.actuator import Actuator, Drive, readings_of
 from dearig.model.simulation.strip import Strip, stress_of
 
 __all__ = ["Problem", "agrees"]
@@ -134,15 +136,53 @@ class Problem:
         self.simulations += steps.size
         if self.on_simulations is not None:
             self.on_simulations(steps.size, self._effort(float(steps.sum())))
+        # the status is that of the first record that fails
+        failed = np.argmax(status != kernel.OK, axis=1)
+        found = np.take_along_axis(status, failed[:, None], axis=1)[:, 0]
+        return self._compared(out), found
+
+    def _compared(self, out: np.ndarray) -> np.ndarray:
+        """Return readings ``out`` (P, N), changed in place, as they are compared with measured."""
         out += self._offsets.nearest(self.readings - out)
         if self._correction is not None:
             # the difference of two predictions with their offsets
             out += self._correction
         if self.drift is not None:
             out += self.drift.nearest(self.measured - out)
-        # the status is that of the first record that fails
-        failed = np.argmax(status != kernel.OK, axis=1)
-        return out, np.take_along_axis(status, failed[:, None], axis=1)[:, 0]
+        return out
+
+    def predict_neighbours(self, values: np.ndarray, coarse: bool = False) -> np.ndarray | None:
+        """Return readings (P, N) of a population ``values`` (P, d), natural, near its first member.
+
+        As of ``predict``, but in steps that all share, so that differences are smooth; with
+        ``coarse`` under the coarse drives. None where the films cannot share steps.
+        """
+        if not isinstance(self.layout.base, Actuator):
+            return None
+        c = self.layout.coefficients(values)
+        coarse = coarse or self._correction is not None
+        films = self._films(c, np.full(len(c), coarse))
+        found: list[np.ndarray | None] = [None] * len(self.records)
+        steps = np.zeros(len(self.records))
+
+        def run(which: list[int]) -> None:
+            for i in which:
+                record = self.records[i]
+                if not isinstance(record, ActuatorRecord):
+                    return
+                moved, steps[i] = readings_of_neighbours(
+                    c, films, self._length, *self._drive(record, coarse), record.lag, record.time
+                )
+                found[i] = None if moved is None else record.seen(moved)
+
+        parallel_map(run, [[i] for i in range(len(self.records))], self.workers)
+        self.simulations += len(films) * len(self.records)
+        if self.on_simulations is not None:
+            self.on_simulations(
+                len(films) * len(self.records), self._effort(float(steps.sum()), len(films))
+            )
+        parts = [part for part in found if part is not None]
+        return self._compared(np.concatenate(parts, axis=1)) if len(parts) == len(found) else None
 
     def _films(self, c: np.ndarray, coarse: np.ndarray) -> list[list[int]]:
         """Group members of a population ``c`` (P, C) whose films move alike, for one simulation."""
@@ -178,29 +218,43 @@ class Problem:
             return float(record.time.size), float(record.time.size)
         return float(record.time.size), float(record.coarse_drive.time.size)
 
-    def _effort(self, steps: float) -> float:
+    def _effort(self, steps: float, side_by_side: int = 0) -> float:
         """Cost of simulating a population in so many ``steps``, in steps of a bare film.
 
-        Counted in steps, not seconds: the same on any machine under any load.
+        Counted in steps, not seconds: the same on any machine under any load. ``side_by_side`` is
+        the number of films that share steps: one of them alone, then packs of them.
         """
         base = self.layout.base
         if isinstance(base, Strip):
             return _POPULATION_COST + _STRIP_SAMPLE_COST * steps
         moving = sum(EFFECTS[name].acts_on != "sensor" for name, _ in base.effects)
-        return _POPULATION_COST + (1.0 + _EFFECT_STEP_COST * moving) * steps
+        # a step of a pack costs as much as one of a film, but effects take its films in turn
+        packs = -(-side_by_side // WIDTH)
+        turns = (1.0 + packs * WIDTH) / (1.0 + packs)
+        return _POPULATION_COST + (1.0 + _EFFECT_STEP_COST * moving * turns) * steps
 
     def _readings(self, c: np.ndarray, record: Record, coarse: bool) -> tuple[np.ndarray, int, int]:
         """Return readings (M, N) of members ``c`` (M, C) whose films move alike; status; steps."""
         if isinstance(record, FilmRecord):
             stress, status, _ = stress_of(c[0], record.time, record.stretch)
             return stress[None], status, record.time.size
-        base = self.layout.base
-        length = base.film.length if isinstance(base, Actuator) else 1.0
-        drive, fidelity = record.drive, self.fidelity
-        if coarse and record.coarse_drive is not None:
-            drive, fidelity = record.coarse_drive, kernel.COARSE
-        moved, status, steps = readings_of(c, length, drive, record.lag, fidelity, record.time)
+        drive, fidelity = self._drive(record, coarse)
+        moved, status, steps = readings_of(
+            c, self._length, drive, record.lag, fidelity, record.time
+        )
         return record.seen(moved), status, steps
+
+    @property
+    def _length(self) -> float:
+        """Length in m of an actuator's film."""
+        base = self.layout.base
+        return base.film.length if isinstance(base, Actuator) else 1.0
+
+    def _drive(self, record: ActuatorRecord, coarse: bool) -> tuple[Drive, int]:
+        """Return the drive and the fidelity at which ``record`` is simulated."""
+        if coarse and record.coarse_drive is not None:
+            return record.coarse_drive, kernel.COARSE
+        return record.drive, self.fidelity
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
         """Return predictions (P, N) over the noise of a population ``values`` (P, d), natural."""
@@ -261,6 +315,10 @@ class Problem:
         columns (to 1e-5), and a one-sided difference blurs the direction in which they differ. With
         the ``residuals`` at ``x`` given, differences are one-sided, for half the cost; with
         ``coarse``, the ``coarse_columns`` come from the coarse drives, for a quarter of that.
+
+        The films of the differences share their steps (``dearig.model.kernel.lanes``). Those that
+        cannot, stiff films and films driven by stretch, are simulated one by one, with wider
+        increments for the noise of their own steps.
         """
         moving = ~self.own[free]
         if not moving.all():
@@ -268,18 +326,29 @@ class Problem:
             jac = np.zeros((self.measured.size, moving.size))
             jac[:, moving] = self.jacobian(x, free & ~self.own, residuals, coarse)
             return jac
+        columns = np.zeros(moving.size, dtype=bool)
+        if residuals is not None and coarse and self.coarse_columns is not None:
+            columns = self.coarse_columns[free]
         if residuals is not None:
-            columns = None
-            if coarse and self.coarse_columns is not None:
-                columns = self.coarse_columns[free]
             return self._one_sided(x, free, residuals, columns)
-        steps = np.diag(self.layout.differences(x))[free]
-        up = np.minimum(x + steps, self.layout.upper)
-        down = np.maximum(x - steps, self.layout.lower)
-        predicted, _ = self.predict(self.layout.values(np.concatenate([up, down])))
+        steps = self.layout.differences(x, in_common=True, central=True)
+        up, down = self._sides(x, free, steps)
+        near = self.predict_neighbours(self.layout.values(np.vstack([x, up, down])))
+        if near is None:
+            up, down = self._sides(x, free, self.layout.differences(x))
+            sides, _ = self.predict(self.layout.values(np.concatenate([up, down])))
+        else:
+            sides = near[1:]
         width = (up - down).sum(axis=1)
         half = width.size
-        return ((predicted[:half] - predicted[half:]) / self.sigma).T / width
+        return ((sides[:half] - sides[half:]) / self.sigma).T / width
+
+    def _sides(
+        self, x: np.ndarray, free: np.ndarray, steps: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return coordinates (f, d) above and below ``x`` (d,) by ``steps`` (d,), in bounds."""
+        away = np.diag(steps)[free]
+        return np.minimum(x + away, self.layout.upper), np.maximum(x - away, self.layout.lower)
 
     def find_coarse_columns(
         self, x: np.ndarray, free: np.ndarray, known: np.ndarray | None = None
@@ -298,8 +367,9 @@ class Problem:
         if known is not None:
             seen[: known.size] = known
             asked[: known.size] = False
-        full = self._one_sided(x, asked, residuals, None)
-        by_coarse = self._one_sided(x, asked, residuals, np.ones(full.shape[1], dtype=bool))
+        count = int(np.count_nonzero(asked))
+        full = self._one_sided(x, asked, residuals, np.zeros(count, dtype=bool))
+        by_coarse = self._one_sided(x, asked, residuals, np.ones(count, dtype=bool))
         seen[asked] = [agrees(w, t) for w, t in zip(full.T, by_coarse.T, strict=True)]
         # where few derivatives agree, the others agree by chance
         return seen if np.mean(seen[free]) > _COARSE_SHARE_MIN else np.zeros_like(seen)
@@ -342,17 +412,44 @@ class Problem:
         )
 
     def _one_sided(
-        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray, coarse: np.ndarray | None
+        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray, coarse: np.ndarray
     ) -> np.ndarray:
-        steps = self.layout.differences(x)
+        """Return one-sided differences (N, f), of columns ``coarse`` (f,) bool by coarse drives.
+
+        ``residuals`` (N,) are those at ``x`` (d,).
+        """
+        there, steps = self._one_side(x, free, self.layout.differences(x, in_common=True))
+        found = np.empty((residuals.size, steps.size))
+        for by_coarse in (False, True):
+            which = coarse == by_coarse
+            if not which.any():
+                continue
+            near = self.predict_neighbours(
+                self.layout.values(np.vstack([x, there[which]])), by_coarse
+            )
+            if near is None:
+                return self._one_by_one(x, free, residuals, coarse)
+            found[:, which] = ((near[1:] - near[0]) / self.sigma).T / steps[which]
+        return found
+
+    def _one_side(
+        self, x: np.ndarray, free: np.ndarray, steps: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return coordinates (f, d) beside ``x`` (d,) by ``steps`` (d,), and those steps (f,)."""
         # away from a bound that is near
         steps = np.where(x + steps > self.layout.upper, -steps, steps)
-        there = x + np.diag(steps)[free]
-        if coarse is None or not coarse.any():
+        return x + np.diag(steps)[free], steps[free]
+
+    def _one_by_one(
+        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray, coarse: np.ndarray
+    ) -> np.ndarray:
+        """Return what ``_one_sided`` does, of films that cannot share steps."""
+        there, steps = self._one_side(x, free, self.layout.differences(x))
+        if not coarse.any():
             predicted, _ = self.predict(self.layout.values(there))
-            return ((predicted - self.measured) / self.sigma - residuals).T / steps[free]
+            return np.asarray(((predicted - self.measured) / self.sigma - residuals).T / steps)
         rows = np.vstack([there, x])
         predicted, _ = self.predict(self.layout.values(rows), np.append(coarse, True))
         moved = (predicted - self.measured) / self.sigma
         here = np.where(coarse[:, None], moved[-1], residuals)
-        return (moved[:-1] - here).T / steps[free]
+        return np.asarray((moved[:-1] - here).T / steps)

@@ -241,13 +241,20 @@ class WhitenedProblem(Problem):
         whitening them in units of the noise.
         """
         predicted, status = super().predict(values, coarse)
+        return self._whitened(predicted), status
+
+    def predict_neighbours(self, values: np.ndarray, coarse: bool = False) -> np.ndarray | None:
+        """Return whitened readings (P, N), as of ``Problem``."""
+        predicted = super().predict_neighbours(values, coarse)
+        return None if predicted is None else self._whitened(predicted)
+
+    def _whitened(self, predicted: np.ndarray) -> np.ndarray:
         if self.noise_drift is None:
-            return predicted, status
+            return predicted
         if self._correction is None:
-            return self.noise_drift.whitened(predicted), status
+            return self.noise_drift.whitened(predicted)
         # the correction by full simulations is of whitened readings
-        plain = predicted - self._correction
-        return self.noise_drift.whitened(plain) + self._correction, status
+        return self.noise_drift.whitened(predicted - self._correction) + self._correction
 
     def white(self) -> WhitenedProblem:
         """Return the same problem under white noise alone."""

@@ -137,8 +137,10 @@ class _Shared(FitLayout):
         found[self._parts] = 1.0
         return found
 
-    def differences(self, x: np.ndarray) -> np.ndarray:
-        found = super().differences(x)
+    def differences(
+        self, x: np.ndarray, in_common: bool = False, central: bool = False
+    ) -> np.ndarray:
+        found = super().differences(x, in_common, central)
         # as of a modulus that is as large as the sum
         found[self._parts] = found[self._total] / max(abs(float(x[self._total])), 1e-300)
         return found

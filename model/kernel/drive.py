@@ -20,10 +20,11 @@ from dearig.model.kernel.effect_forces import (
 from dearig.model.kernel.exponential_rk import BRANCHES_MAX, exponential_steps, film_table, is_swift
 from dearig.model.kernel.motion import admissible, rates, reason_to_fail, spring_table
 from dearig.model.kernel.propagator import (
+    DRAG,
     PROPAGATOR,
-    drag_class,
-    fill_propagator,
-    is_propagator_of,
+    PROPAGATORS,
+    STIFFNESS,
+    propagator_for,
 )
 from dearig.model.kernel.rk4 import rk4_steps
 from dearig.model.kernel.rodas import LONGEST, WORTH, cross_by_rodas
@@ -46,11 +47,12 @@ from dearig.model.kernel.step_control import (
 )
 from dearig.model.kinematics import electric
 
-__all__ = ["drive_by_voltage"]
+__all__ = ["LOG", "drive_by_voltage", "drive_with_log", "log_interval"]
+
+LOG = 3 + 2 * BRANCHES_MAX  #: numbers of an interval in a log
 
 _LOOK_EVERY = 64  # samples: the film's stiffness follows the stretch slowly
 _EVEN = 1e-6  # of an interval: so near are intervals of one length
-_PROPAGATORS = 256  # that are kept
 _DRAG_MISSED = 1.5  # of the steps taken: so many may a drag ask for after the fact
 
 
@@ -60,11 +62,12 @@ class Workspace(NamedTuple):
     springs: np.ndarray  # (WIDTH + 3, n + 1): spring_table
     table: np.ndarray  # film_table, or (0,)
     branches: np.ndarray  # (2, 3 or more): network_stiffness
-    propagators: np.ndarray  # (_PROPAGATORS, PROPAGATOR)
+    propagators: np.ndarray  # (PROPAGATORS, PROPAGATOR)
     phi: np.ndarray  # (7, 3, 3)
     work: np.ndarray  # (15, y.size)
     before: np.ndarray  # (y.size,): the state at the last sample
     trace: np.ndarray  # (5,): accelerations and speeds met, see rk4_steps and exponential_steps
+    log: np.ndarray  # (N, LOG), or (0, LOG) where none is kept: log_interval
 
 
 @inlined
@@ -103,33 +106,6 @@ def _steps_by_ringing(
 
 
 @inlined
-def _propagator_for(
-    room: Workspace,
-    current: int,
-    stiffness: float,
-    grain: float,
-    drag: float,
-    h: float,
-    fine: int,
-) -> int:
-    """Return the row of ``room.propagators`` for a film so stiff, filled where it was not.
-
-    Stiffnesses are told apart by ``grain`` 1/s^2; the ``current`` row is kept where it is near
-    enough. A row is found again by a hash of what it was made of.
-    """
-    propagators = room.propagators
-    group = drag_class(drag)
-    row = current
-    if not is_propagator_of(propagators[row], stiffness, 0.5 * grain, group, h):
-        level = max(math.floor(stiffness / grain), 1.0)
-        middle = (level + 0.5) * grain
-        row = (int(level) + 37 * fine + 101 * group) % _PROPAGATORS
-        if not is_propagator_of(propagators[row], middle, 0.0, group, h):
-            fill_propagator(middle, drag, room.branches, h, room.phi, propagators[row])
-    return row
-
-
-@inlined
 def _cross_exponentially(
     policy: Policy,
     film: Stiffness,
@@ -147,11 +123,11 @@ def _cross_exponentially(
     fine: int,
     change: float,
     hasty: bool,
-) -> tuple[int, int]:
+) -> tuple[int, int, int]:
     """Cross one interval ``dt`` from ``room.before`` in ``fine`` steps, or more where a drag asks.
 
     ``change`` is how much the rate of stretch may change meanwhile. Returns the steps taken, also
-    those in vain, and the row of ``room.propagators`` that was used.
+    those in vain, the steps of the interval, and the row of ``room.propagators`` that was used.
     """
     before, trace = room.before, room.trace
     taken, row, drag, asked = 0, current, 0.0, 0.0
@@ -165,7 +141,9 @@ def _cross_exponentially(
         # a drag may change with the rate: then in finer steps
         fine = max(fine, math.ceil(min(asked, DRAG_SUBSTEPS_MAX)))
         h = dt / fine
-        row = _propagator_for(room, row, stiffness, grain, drag, h, fine)
+        row = propagator_for(
+            room.propagators, room.branches, room.phi, row, stiffness, grain, drag, h, fine
+        )
         exponential_steps(
             policy.acting, c, room.table, room.branches, room.propagators[row], y, v0, v1, t,
             warmth, h, fine, fine // pace.calm_steps if fine > pace.calm_steps else 1, trace,
@@ -183,7 +161,23 @@ def _cross_exponentially(
             fine = DRAG_SUBSTEPS_MAX
         trace[0], trace[1] = seen, seen_before
         _copy(before, y, y.shape[0])
-    return taken, row
+    return taken, fine, row
+
+
+@inlined
+def log_interval(
+    log: np.ndarray, k: int, fine: int, propagator: np.ndarray, branches: np.ndarray
+) -> None:
+    """Enter in ``log`` (N, LOG) how interval ``k`` was crossed.
+
+    In so many steps, with the stiffness and the drag of the propagator, and with ``branches`` of
+    ``network_stiffness``. A log of 0 steps is of an interval that the exponential method did not
+    cross.
+    """
+    log[k, 0], log[k, 1], log[k, 2] = fine, propagator[STIFFNESS], propagator[DRAG]
+    for i in range(BRANCHES_MAX):
+        log[k, 3 + i] = branches[0, i]
+        log[k, 3 + BRANCHES_MAX + i] = branches[1, i]
 
 
 @jit
@@ -235,7 +229,7 @@ def _follow(
             dt_paced = 0.0
         if abs(dt - dt_paced) > _EVEN * dt:
             pace, dt_paced = pace_of(policy, film, dt), dt
-        explicit = pace.explicit
+        explicit, fine = pace.explicit, 0
         if explicit:
             # how the field jumps, and how its slope does: the jump of section 7
             sloped = (last * last - last_begin * last_begin) * (dt / dt_before)
@@ -269,7 +263,7 @@ def _follow(
                 forced = 3.0 * min(abs(jump), abs(jump_before))
             # the interval itself: the exponential method, or classical Runge-Kutta
             if policy.exponential:
-                more, row = _cross_exponentially(
+                more, fine, row = _cross_exponentially(
                     policy, film, pace, c, room, row, grain, y,
                     v0, v1, time[k], theta, dt, fine, change, hasty,
                 )  # fmt: skip
@@ -290,6 +284,8 @@ def _follow(
                 explicit = policy.acting != 0 or not too_stiff(film, softer)
             if not explicit:
                 _copy(before, y, carried)
+        if policy.exponential and room.log.shape[0]:
+            log_interval(room.log, k, fine if explicit else 0, room.propagators[row], branches)
         last, last_begin, dt_before = v1, v0, dt
         # the stiff method, section 8
         if not explicit:
@@ -320,23 +316,26 @@ def _drive(
     stretch: np.ndarray,
     rate: np.ndarray,
     fidelity: int,
+    others: int,
+    log: np.ndarray,
 ) -> tuple[int, int, int]:
-    """Do what ``drive_by_voltage`` does: the arrays it needs, and the loop."""
+    """Do what ``drive_with_log`` does: the arrays it needs, and the loop."""
     springs = spring_table(c)
     c = c.copy()
     acting = active_effects(c)
     c[INERTIA] += added_inertia(acting, c, y)
-    policy = policy_of(acting, is_swift(c), fidelity)
+    policy = policy_of(acting, acting | others, is_swift(c), fidelity)
     # whoever makes arrays counts their owners, in every call: the loop must not
     room = Workspace(
         springs,
         film_table(c, springs) if policy.exponential else np.zeros(0),
         np.zeros((2, max(springs.shape[1] - 1, BRANCHES_MAX))),
-        np.zeros((_PROPAGATORS, PROPAGATOR)),
+        np.zeros((PROPAGATORS, PROPAGATOR)),
         np.empty((7, 3, 3)),
         np.zeros((15, y.shape[0])),
         y.copy(),
         np.zeros(5),
+        log,
     )
     return _follow(policy, acting, c, time, voltage, ends, air, y, stretch, rate, room)
 
@@ -367,5 +366,27 @@ def drive_by_voltage(
     are filled with the last stretch that was reached, never with NaN. ``steps`` were taken; a
     sample by the stiff method counts for the explicit steps that take as long.
     """
+    log = np.zeros((0, LOG))
+    return drive_with_log(c, time, voltage, ends, air, y, stretch, rate, fidelity, 0, log)
+
+
+def drive_with_log(
+    c: np.ndarray,
+    time: np.ndarray,
+    voltage: np.ndarray,
+    ends: np.ndarray,
+    air: np.ndarray,
+    y: np.ndarray,
+    stretch: np.ndarray,
+    rate: np.ndarray,
+    fidelity: int,
+    others: int,
+    log: np.ndarray,
+) -> tuple[int, int, int]:
+    """Do what ``drive_by_voltage`` does, in steps that suit the effects ``others`` as well.
+
+    ``others`` has the bits of effects that may be neutral in ``c``. How each interval is crossed is
+    entered in ``log`` (N, LOG), see ``log_interval``; it may be (0, LOG).
+    """
     drive = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
-    return _drive(c, *drive, y, stretch, rate, fidelity)
+    return _drive(c, *drive, y, stretch, rate, fidelity, others, log)

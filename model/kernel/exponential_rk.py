@@ -19,15 +19,12 @@ from dearig.model.coefficients import (
     WIDTH,
 )
 from dearig.model.compiled.jit import allocating, inlined, jit
+from dearig.model.compiled.packs import first as first_film
+from dearig.model.compiled.packs import spread
 from dearig.model.effects import MEMORY
 from dearig.model.film.network import HEAD, branch_count
-from dearig.model.kernel.effect_forces import (
-    COMMIT,
-    affected,
-    commit,
-    supplied,
-    supplied_at_start,
-)
+from dearig.model.kernel.effect_forces import COMMIT
+from dearig.model.kernel.lane_forces import affected, commit, supplied, supplied_at_start
 from dearig.model.kernel.motion import STIFFENING
 from dearig.model.kernel.propagator import (
     COUPLING,
@@ -41,11 +38,19 @@ from dearig.model.kernel.propagator import (
 )
 from dearig.model.springs import SPRINGS
 
-__all__ = ["BRANCHES_MAX", "exponential_steps", "film_table", "is_swift"]
+__all__ = [
+    "BRANCHES_MAX",
+    "TABLE",
+    "exponential_steps",
+    "film_steps",
+    "film_table",
+    "is_swift",
+]
 
 _GENT = SPRINGS.index("gent")  # the neo-Hookean spring comes before it
 BRANCHES_MAX = 3  #: written out in the step
 _INERTIA_AT = 2 + 3 * (1 + BRANCHES_MAX)  # in the film table
+TABLE = _INERTIA_AT + 1  #: numbers of the film table
 
 
 @jit
@@ -69,7 +74,7 @@ def film_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
     Load and field over the inertia, then for each spring its modulus over the inertia, 1/J and 1/T
     (zeros for springs that are missing), then the inertia.
     """
-    table = np.zeros(_INERTIA_AT + 1)
+    table = np.zeros(TABLE)
     table[_INERTIA_AT] = c[INERTIA]
     table[0], table[1] = c[FORCE] / c[INERTIA], c[ELECTRIC] / c[INERTIA]
     for i in range(springs.shape[1]):
@@ -91,13 +96,15 @@ def _pull(p: float, q: float, stiffening: float, modulus: float) -> float:
 
 
 @inlined
-def _steps(
+def film_steps(
     acting: int,
     c: np.ndarray,
+    memory: np.ndarray,
     table: np.ndarray,
     branches: np.ndarray,
     propagator: np.ndarray,
     y: np.ndarray,
+    origin: float,
     v0: float,
     v1: float,
     t0: float,
@@ -107,11 +114,15 @@ def _steps(
     stride: int,
     trace: np.ndarray,
 ) -> None:
-    """Take the steps of ``exponential_steps``: one compiled kernel, all of it in registers."""
+    """Take the steps of ``exponential_steps``: one compiled kernel, all of it in registers.
+
+    It carries one film, or a pack of films (``dearig.model.compiled.packs``): then ``y`` and
+    ``table`` are rows of packs, and ``c`` and ``memory`` are as ``lane_forces`` has them. The
+    stretches in ``y``, of film and branches, are counted from ``origin``.
+    """
     # One piece: the stages share some sixty numbers, which calls would send through memory.
     # Sections and names are those of EXPONENTIAL.md: (z, v, i) is u of section 2
-    n = y.shape[0] - 2 - MEMORY
-    memory = y[2 + n :]
+    n = len(y) - 2
     load, electric_gain, over = table[0], table[1], table[14]
     m0, g0 = table[2], table[3]
     m1, g1, r1 = table[5], table[6], table[7]
@@ -142,21 +153,23 @@ def _steps(
     i3 = per_mean * branches[0, 2] * r3
     l1, l2, l3 = s1 * relaxation, s2 * relaxation, s3 * relaxation
     s1p, s2p, s3p = s1 * p3, s2 * p3, s3 * p3
-    x1 = y[2] if n > 0 else 1.0
-    x2 = y[3] if n > 1 else 1.0
-    x3 = y[4] if n > 2 else 1.0
-    lam, speed = y[0], y[1]
+    # sums of small steps: counted from an origin nearby, they round less
+    moved, speed = y[0], y[1]
+    moved1 = y[2] if n > 0 else spread(1.0, moved) - origin
+    moved2 = y[3] if n > 1 else spread(1.0, moved) - origin
+    moved3 = y[4] if n > 2 else spread(1.0, moved) - origin
+    lam, x1, x2, x3 = origin + moved, origin + moved1, origin + moved2, origin + moved3
     half, sixth = 0.5 * h, h / 6.0
     per_half = 1.0 / half
     dv = (v1 - v0) / steps
     last, last_but_one, bend = trace[0], trace[1], 0.0
-    slow = fast = abs(speed)
+    slow = fast = abs(first_film(speed))
     due = 0
     for m in range(steps):
         va = v0 + dv * m
         vm, vb = va + 0.5 * dv, va + dv
-        fa, fm, fb = va * va, vm * vm, vb * vb
-        now, t = va, t0 + m * h
+        fa, fm, fb = spread(va * va, lam), spread(vm * vm, lam), spread(vb * vb, lam)
+        now, t = spread(va, lam), t0 + m * h
         if acting:
             now, fa = supplied_at_start(acting, c, memory, t, lam, speed, va)
 
@@ -178,8 +191,9 @@ def _steps(
         a += load
         if m == due:
             due += stride
-            bend = max(bend, abs(a - 2.0 * last + last_but_one))
-            last_but_one, last = last, a
+            met = first_film(a)
+            bend = max(bend, abs(met - 2.0 * last + last_but_one))
+            last_but_one, last = last, met
         inner = i1 * t1 + i2 * t2 + i3 * t3
         f1, f2, f3 = r1 * t1 + l1 * inner, r2 * t2 + l2 * inner, r3 * t3 + l3 * inner
         first = a + (d * speed - w * inner)
@@ -285,25 +299,28 @@ def _steps(
 
         # the step: e^{Lh} u_0 + h (weights of N_1, N_2 + N_3, N_4); section 5 for the branches
         lam0, both = lam, second + third
-        lam += w1 * speed + w13 * inner + a1 * first + b1 * both + c1 * fourth
+        moved += w1 * speed + w13 * inner + a1 * first + b1 * both + c1 * fourth
+        lam = origin + moved
         gave = w3 * speed + (w33 - 1.0) * inner + a3 * first + b3 * both + c3 * fourth
         speed = w2 * speed + w23 * inner + a2 * first + b2 * both + c2 * fourth
         if acting:
-            slow, fast = min(slow, abs(speed)), max(fast, abs(speed))
+            met = abs(first_film(speed))
+            slow, fast = min(slow, met), max(fast, met)
         if acting & COMMIT:
             commit(acting, c, memory, lam, speed, lam0, h, t)
-        x1 += sixth * (sum_1 + r1 * t1 - (s1 * went + f1 * left)) + s1 * gave + f1 * faded
-        x2 += sixth * (sum_2 + r2 * t2 - (s2 * went + f2 * left)) + s2 * gave + f2 * faded
-        x3 += sixth * (sum_3 + r3 * t3 - (s3 * went + f3 * left)) + s3 * gave + f3 * faded
+        moved1 += sixth * (sum_1 + r1 * t1 - (s1 * went + f1 * left)) + s1 * gave + f1 * faded
+        moved2 += sixth * (sum_2 + r2 * t2 - (s2 * went + f2 * left)) + s2 * gave + f2 * faded
+        moved3 += sixth * (sum_3 + r3 * t3 - (s3 * went + f3 * left)) + s3 * gave + f3 * faded
+        x1, x2, x3 = origin + moved1, origin + moved2, origin + moved3
     trace[0], trace[1], trace[2] = last, last_but_one, bend
     trace[3], trace[4] = slow, fast
-    y[0], y[1] = lam, speed
+    y[0], y[1] = moved, speed
     if n > 0:
-        y[2] = x1
+        y[2] = moved1
     if n > 1:
-        y[3] = x2
+        y[3] = moved2
     if n > 2:
-        y[4] = x3
+        y[4] = moved3
 
 
 @jit
@@ -323,9 +340,11 @@ def _steps_with_effects(
     stride: int,
     trace: np.ndarray,
 ) -> None:
-    _steps(
+    n = y.shape[0] - MEMORY
+    film_steps(
         acting,
-        c, table, branches, propagator, y, v0, v1, t0, warmth, h, steps, stride, trace,
+        c, y[n:], table, branches, propagator, y[:n], 0.0, v0, v1, t0, warmth, h, steps, stride,
+        trace,
     )  # fmt: skip
 
 
@@ -360,6 +379,9 @@ def exponential_steps(
             c, table, branches, propagator, y, v0, v1, t0, warmth, h, steps, stride, trace,
         )  # fmt: skip
     else:
-        _steps(
-            0, c, table, branches, propagator, y, v0, v1, t0, warmth, h, steps, stride, trace,
+        n = y.shape[0] - MEMORY
+        film_steps(
+            0,
+            c, y[n:], table, branches, propagator, y[:n], 0.0, v0, v1, t0, warmth, h, steps, stride,
+            trace,
         )  # fmt: skip

@@ -16,12 +16,15 @@ from dearig.model.kernel.phi import double_phi, fill_phi
 
 __all__ = [
     "PROPAGATOR",
+    "PROPAGATORS",
     "drag_class",
     "fill_propagator",
     "is_propagator_of",
+    "propagator_for",
 ]
 
 PROPAGATOR = 40  #: numbers of a propagator
+PROPAGATORS = 256  #: that are kept
 # where the values stand that it was made of, and what is derived from them
 STIFFNESS, DRAG, COUPLING, STEP, DRAG_CLASS, RELAXATION = 30, 31, 32, 33, 34, 35
 FADED_HALF, FADED, INVERSE_COUPLING, INVERSE_RELAXATION = 36, 37, 38, 39
@@ -102,3 +105,32 @@ def is_propagator_of(propagator: np.ndarray, k: float, near: float, drag: int, h
         and drag == propagator[DRAG_CLASS]
         and abs(h - propagator[STEP]) <= _STEP_NEAR * h
     )
+
+
+@inlined
+def propagator_for(
+    propagators: np.ndarray,
+    branches: np.ndarray,
+    phi: np.ndarray,
+    current: int,
+    stiffness: float,
+    grain: float,
+    drag: float,
+    h: float,
+    fine: int,
+) -> int:
+    """Return the row of ``propagators`` for a film so stiff, filled where it was not.
+
+    ``propagators`` is (PROPAGATORS, PROPAGATOR), ``branches`` is ``network_stiffness``'s, ``phi``
+    (7, 3, 3) is room. Stiffnesses are told apart by ``grain`` 1/s^2; the ``current`` row is kept
+    where it is near enough. A row is found again by a hash of what it was made of.
+    """
+    group = drag_class(drag)
+    row = current
+    if not is_propagator_of(propagators[row], stiffness, 0.5 * grain, group, h):
+        level = max(math.floor(stiffness / grain), 1.0)
+        middle = (level + 0.5) * grain
+        row = (int(level) + 37 * fine + 101 * group) % PROPAGATORS
+        if not is_propagator_of(propagators[row], middle, 0.0, group, h):
+            fill_propagator(middle, drag, branches, h, phi, propagators[row])
+    return row

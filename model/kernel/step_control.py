@@ -110,8 +110,11 @@ class Pace(NamedTuple):
 
 
 @jit
-def policy_of(acting: int, exponential: bool, fidelity: int) -> Policy:
-    """Return how a film with the effects ``acting`` is stepped at a ``fidelity``."""
+def policy_of(own: int, acting: int, exponential: bool, fidelity: int) -> Policy:
+    """Return how a film with its ``own`` effects is stepped at a ``fidelity``.
+
+    Its steps suit all effects ``acting``, its own and those of the films beside it.
+    """
     moves = acting & MOVING != 0
     most = _EXPONENTIAL_SUBSTEPS_MAX if exponential else _RK4_SUBSTEPS_MAX
     # ringing is in closed form, but not its turning points, on which hysteretic effects depend
@@ -127,7 +130,7 @@ def policy_of(acting: int, exponential: bool, fidelity: int) -> Policy:
     if not fine_only:
         longest = _COARSE_STEP_MAX if fidelity == COARSE else _QUICK_STEP_MAX
     return Policy(
-        acting if moves else 0,
+        own if own & MOVING else 0,
         exponential,
         acting & DRAGS != 0,
         fine_only,

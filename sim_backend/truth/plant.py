@@ -150,15 +150,16 @@ class TruthPlant:
         hold: bool,
         settled: np.ndarray | None,
         carries: list[object],
-    ) -> tuple[Supply, np.ndarray, np.ndarray]:
-        """Return the supply of the film, and the output and what the monitor shows (2, N - 1) V.
+    ) -> tuple[Supply, np.ndarray, np.ndarray | None]:
+        """Return the supply of the film, the output and, if a fault is seen, what is shown of it.
 
+        Output and what the monitor shows are (2, N - 1) V.
         ``carries`` are replaced by those after the call.
         """
         held = (voltage if settled is None else settled).copy()
         last = held if hold else np.append(held[1:], held[-1:])
         supply = Supply(voltage.copy(), held, last)
-        output = shown = np.stack((held[:-1], last[:-1]))
+        output, shown = np.stack((held[:-1], last[:-1])), None
         for i, (effect, stage) in enumerate(self.on_voltage):
             supply, carries[i] = stage(time, supply, carries[i])
             if effect.acts_on == "amplifier":
@@ -173,7 +174,7 @@ class TruthPlant:
         supply: Supply,
         courses: np.ndarray,
         output: np.ndarray,
-        shown: np.ndarray,
+        shown: np.ndarray | None,
     ) -> tuple[Electricity, tuple[float, float]]:
         """Return the electricity along the motion ``rows`` (5, N), and the state after it."""
         hidden, capacitance = self.numbers.hidden, self.numbers.capacitance
@@ -204,5 +205,5 @@ class TruthPlant:
         leaks = hidden.leak_conductance > 0.0
         lag = hidden.leak_series * capacitance * self.rest**2 if leaks else 0.0
         voltage, charge, charging, conduction = ends
-        electric = Electricity(shown, output, voltage, charge, step, charging, conduction, lag)
+        electric = Electricity(output, voltage, charge, step, charging, conduction, lag, shown)
         return electric, (float(state[0]), float(state[1]))

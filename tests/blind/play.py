@@ -186,6 +186,7 @@ class Bench:
             "truth": {
                 "families": list(truth.families),
                 "description": truth.description,
+                "shown_by_monitor": [effect.seen for effect in truth.effects],
                 "hidden_um": truth.size(time, voltage) * 1e6,
             },
             "wall_s": seconds,

@@ -28,7 +28,7 @@ def charged(voltage, capacitance=CAPACITANCE, lag=0.0):
     ends = np.stack((voltage, voltage))
     charge, nothing = capacitance * ends, np.zeros_like(ends)
     step = np.diff(charge[0], prepend=0.0)
-    return Electricity(ends, ends, ends, charge, step, nothing, nothing, lag)
+    return Electricity(ends, ends, charge, step, nothing, nothing, lag)
 
 
 def monitor(spacing, **settings):

@@ -133,6 +133,14 @@ MEASUREMENTS = {
             "tests.blind --cases 0 --clean 50 --train thesis --jobs 2",
         ),
     ),
+    "misses": Measurement(
+        "Where the error of the rigs comes from that the diagnosis misses",
+        (
+            "tests.benchmarks.bench_misses --rows misses.jsonl --first 244000 --rigs 100",
+            "tests.benchmarks.bench_misses --rows misses.jsonl --first 244000 --rigs 100 "
+            "--generator second",
+        ),
+    ),
     "diagnosis-peers": Measurement(
         "The diagnosis beside general methods",
         ("tests.benchmarks.bench_diagnosis --train thesis --seeds 2003,79,225",),

@@ -21,7 +21,7 @@ from tests.sim_backend.truth.test_cases import FORMS
 
 NUMBERS = FilmNumbers.of(THESIS_FILM, THESIS_LOAD, TABLE_3)
 ROWS = ("displacement", "velocity", "heating")
-CURRENTS = ("shown", "output", "voltage", "charge", "step", "charging", "conduction")
+CURRENTS = ("output", "voltage", "charge", "step", "charging", "conduction")
 
 
 def drawn(form, seed=0):

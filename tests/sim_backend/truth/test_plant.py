@@ -49,7 +49,7 @@ def test_without_effects_it_is_the_models_film(drive, hold, rest_length):
         time, voltage, hold
     )
     assert np.abs(truth.displacement - model.displacement).max() < 0.05e-6
-    for row in ("shown", "output", "voltage", "charge", "step", "conduction"):
+    for row in ("output", "voltage", "charge", "step", "conduction"):
         ours, theirs = (getattr(motion.electricity, row) for motion in (truth, model))
         np.testing.assert_allclose(ours, theirs, atol=2e-5 * np.abs(theirs).max())
     # the model's is a mean over the interval, in which the film swings
