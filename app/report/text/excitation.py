@@ -58,8 +58,13 @@ def _bands_text(bands: Sequence[Band]) -> str:
 
 
 def tested_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
-    """Yield how far a verdict holds that validation recordings confirm."""
+    """Yield how far validation recordings test a verdict that they confirm, or that none do."""
     tested, verdict = outcome.tested, outcome.verdict
+    if not outcome.after.validation:
+        yield (
+            "No validation recordings were given: the errors do not show how well the model "
+            "predicts other recordings."
+        )
     if tested is not None and verdict in (EXPLAINED, NOTHING_MISSING):
         yield (
             f"The validation recordings test this up to {significant(tested.voltage / 1e3)} kV, "

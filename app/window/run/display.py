@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
 
@@ -14,6 +17,7 @@ from dearig.window.run.channel_plots import ChannelPlots
 from dearig.window.run.live import Live, LiveEvent
 from dearig.window.run.live_analysis import LiveAnalysis
 from dearig.window.run.marks import MarkBar
+from dearig.window.run.pace import Pace
 from dearig.window.run.plots import RunPlots
 from dearig.window.run.view import RunView
 from dearig.window.session.layout_state import remember
@@ -34,9 +38,17 @@ class RunDisplay(QWidget):
     after its end until then.
     """
 
-    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        session: Session,
+        parent: QWidget | None = None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         super().__init__(parent)
         self._session = session
+        self._clock = clock
+        self._pace = Pace()
         self._live: Live | None = None
         self._running = False
         self._marks: list[tuple[str, float, str, str]] = []  # of the run: key, time, words, level
@@ -77,7 +89,7 @@ class RunDisplay(QWidget):
         """Show the plan of the session; during a run nothing changes."""
         if self._running:
             return
-        preview = self._session.preview
+        preview = self._session.preview or self._session.outline
         self._stop_drawing()
         self.view.show_planned(preview)
         self.plots.show_prediction(preview)
@@ -88,6 +100,7 @@ class RunDisplay(QWidget):
     def begin(self, live: Live, preview: Preview | None, name: str, marks: RunMarks | None) -> None:
         """Show the run of ``live`` from its start; without ``marks``, none can be set in it."""
         self._live, self._running, self._drawn = live, True, _NOTHING
+        self._pace = Pace()
         self._marks.clear()
         self._run_channels = self._session.rig_file.channel
         self.view.begin(name)
@@ -166,15 +179,23 @@ class RunDisplay(QWidget):
         now = None if live is None else live.now()
         if live is None or now is None or self.view.shows_plan or not self.isVisible():
             return
-        at = None if self.plots.following else self.plots.x_range()
-        frame = (now.revision, self.plots.span_s, at)
+        end = now.samples / now.rate
+        shown = self._pace.shown(end, self._clock()) if self._running else end
+        following = self.plots.following
+        at = None if following else self.plots.x_range()
+        # while the axis stands, curves grow from frame to frame; later it moves below them
+        step = self.plots.step_of(shown) if following else 0
+        frame = (now.revision, self.plots.span_s, at, step, self._running)
         if frame == self._drawn:
+            self.plots.flow(shown)
             return
         self._drawn = frame
-        end = now.samples / now.rate
-        self.plots.draw(live, end)
+        self.plots.draw(live, end, shown)
         names = [channel.name for channel in self._channels]
-        self.channel_plots.draw(live, names, *self.plots.x_range())
+        first, last = self.plots.x_range()
+        if following:
+            last = self.plots.last_drawn(end, shown)
+        self.channel_plots.draw(live, names, first, last)
 
     def _start_drawing(self) -> None:
         self._frames.start()

@@ -229,18 +229,18 @@ class RunPlots(QWidget):
             self._low[name], self._high[name] = -least, least
         self._duration = 1.0
         self._marks.clear()
-        plan = None if preview is None else preview.plan
-        if preview is not None and plan is not None:
-            self._duration = plan.duration
+        planned = preview is not None and (preview.plan is not None or preview.is_outline)
+        if preview is not None and planned:
+            self._duration = preview.duration
             self.digest = preview.digest
             for name in ("voltage", "displacement"):
                 x, y = preview.curves[name]
                 self._include(name, y)
                 self._planned[name].set_points(x, y * _SCALE[name])
             self._draw_band(*preview.curves["voltage"])
-        self._planned_shown, self._run_shown = plan is not None, False
+        self._planned_shown, self._run_shown = planned, False
         for name in _UNPREDICTED:
-            self.overlays[name].show_words("measured during the run" if plan is not None else "")
+            self.overlays[name].show_words("measured during the run" if planned else "")
         self._show_levels()
         self._name()
         self._draw_marks()
@@ -264,19 +264,50 @@ class RunPlots(QWidget):
         self.area.set_live(live=True)
         self.area.roll(*self._span(0.0))
 
-    def draw(self, live: Live, end: float) -> None:
-        """Draw the curves up to ``end`` s, or those of the time that the operator looks at."""
+    def step_of(self, shown: float) -> int:
+        """Return the pixel that a run which is shown up to ``shown`` s has come to.
+
+        It is 0 once the time axis moves: then ``flow`` shows what comes.
+        """
+        if self._moves(shown):
+            return 0
+        first, last = self._span(shown)
+        return int((shown - first) / (last - first) * self.width())
+
+    def last_drawn(self, end: float, shown: float) -> float:
+        """Return the s up to which curves are drawn of a run that has come to ``end`` s."""
+        return end if self._moves(shown) else shown
+
+    def flow(self, shown: float) -> None:
+        """Move the time axis to ``shown`` s, below curves that are drawn already."""
+        span = self._span(shown)
+        if self._moves(shown) and self.area.following and self.area.span() != span:
+            self.area.roll(*span)
+            self.area.data_changed()
+
+    def _moves(self, shown: float) -> bool:
+        return self.span_s is not None and shown > self.span_s
+
+    def draw(self, live: Live, end: float, shown: float | None = None) -> None:
+        """Draw the curves of a run that has come to ``end`` s.
+
+        The time axis ends at ``shown`` s, by default there too, unless the operator looks at
+        another time.
+        """
         if live is not self._live:
             self._live = live
             self._supply(live)
-        begin, until = self._span(end) if self.area.following else self.area.span()
+        shown = end if shown is None else shown
+        following = self.area.following
+        begin, until = self._span(shown) if following else self.area.span()
+        last = self.last_drawn(end, shown) if following else until
         changed = False
         for name in self.shown:
             low, high = math.inf, -math.inf
             for signal in _SIGNALS[name][1]:
                 if not self._exists(signal):
                     continue
-                x, y = live.view(signal, begin, until)
+                x, y = live.view(signal, begin, last)
                 self._curves[signal].set_points(x, y * _SCALE[name], thinned=True)
                 known = y[np.isfinite(y)]
                 if known.size:

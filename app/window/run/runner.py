@@ -186,6 +186,8 @@ class Runner(QObject):
         What blocks arming is obeyed. A rig that is armed for something else stays so.
         """
         if not self.running and armed != self.armed and not (armed and self._session.blocks):
+            if armed:
+                self._session.arming.emit()
             self._armed_for = play
             self.status.set_phase(HighVoltage.ARMED if armed else None)
         return self.armed_for(play)

@@ -58,6 +58,7 @@ from dearig.window.shell.banners import Banners
 from dearig.window.shell.compilation import Compilation, CompilationBar
 from dearig.window.shell.error_panel import ErrorPanel
 from dearig.window.shell.guide import Guide
+from dearig.window.shell.idle_pages import IdlePages
 from dearig.window.shell.pages import PAGES
 
 __all__ = ["MainWindow", "WheelGuard"]
@@ -91,10 +92,12 @@ class MainWindow(QMainWindow):
         self._closing = self._settling = False
         self._by_signal = False  # closed by a signal: nobody is there to be asked
         self._connect()
+        self.idle_pages = IdlePages(session, self._make_next_page, self)
         self._apply_colour_scheme()
         self._restore_state()
         if not self.compilation.start():
             self.planner.renew()
+        self.idle_pages.start()
 
     # pages
 
@@ -108,6 +111,13 @@ class MainWindow(QMainWindow):
         if kind not in self._pages:
             self._put(kind.make(self.session, self))
         return cast(P, self._pages[kind])
+
+    def _make_next_page(self) -> bool:
+        """Make a page that has not been needed yet; return False where there is none."""
+        kind = next((kind for kind in PAGES if kind not in self._pages), None)
+        if kind is not None:
+            self.page(kind)
+        return kind is not None
 
     def _put(self, page: Page) -> None:
         """Put a new page into its place, which is empty and not shown, and serve its signals."""
@@ -199,6 +209,7 @@ class MainWindow(QMainWindow):
         self._save_state()
         self.stop_keys.watch(False)
         self.run_page.close_work()  # first: the rig is made safe
+        self.idle_pages.close()
         self.compilation.close()
         self.bar.close_work()
         self.planner.close()

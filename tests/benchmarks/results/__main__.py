@@ -78,6 +78,10 @@ MEASUREMENTS = {
             "tests.benchmarks.bench_daqmx hour",
         ),
     ),
+    "averaging": Measurement(
+        "Noise and cost of rows that are means of conversions",
+        ("tests.benchmarks.bench_averaging", "tests.benchmarks.bench_averaging --cost"),
+    ),
     "plan": Measurement(
         "Processor time and memory of long runs", ("tests.benchmarks.bench_plan --full",)
     ),
@@ -127,6 +131,14 @@ MEASUREMENTS = {
             "tests.blind --first 2001 --cases 60 --clean 0 --train thesis --jobs 1",
             "tests.blind --first 2201 --cases 40 --clean 0 --train rich --jobs 1",
             "tests.blind --cases 0 --clean 50 --train thesis --jobs 2",
+        ),
+    ),
+    "misses": Measurement(
+        "Where the error of the rigs comes from that the diagnosis misses",
+        (
+            "tests.benchmarks.bench_misses --rows misses.jsonl --first 244000 --rigs 100",
+            "tests.benchmarks.bench_misses --rows misses.jsonl --first 244000 --rigs 100 "
+            "--generator second",
         ),
     ),
     "diagnosis-peers": Measurement(

@@ -7,9 +7,13 @@ from dataclasses import replace
 import pytest
 
 from dearig.model.diagnosis.channels import ChannelEvidence
+from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.fits import Fitter
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from dearig.model.fitting.channels import Channels
+from dearig.model.fitting.channels import Channels, JointProblem
+from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.channels import CURRENT, VOLTAGE_MONITOR
+from dearig.model.readings.records import ActuatorRecord
 from tests.model.fitting.test_channels import ELECTRODE, LAG, LEAK, PLAIN, SATURATION, record
 
 
@@ -85,3 +89,38 @@ def test_near_nothing_is_neither_confirmed_nor_denied(value):
     evidence = evidence_of(record())
     assert evidence.denied(with_(lag)) is None
     assert [s.verdict for s in evidence.says(with_(lag), "amplifier lag")] == ["silent", "silent"]
+
+
+def test_without_channels_problems_and_criterion_are_those_of_the_displacement():
+    made = record()
+    seen = made.displacement - made.displacement[: made.lead_in].mean()
+    alone = ActuatorRecord("made", made.drive, seen, 1e-6, lead_in=made.lead_in)
+    fitter = Fitter([alone], PLAIN, DiagnosisSettings(), workers=1)
+    fitter.read_noise(PLAIN)
+    assert not fitter.channels
+    problem = fitter.problem(with_(LAG))
+    assert type(problem) is WhitenedProblem
+    x = problem.layout.coordinates(problem.layout.initial())
+    fit = fitter.descend(problem, x, 0)
+    assert fit.residuals.size == problem.measured.size
+    judge = Judge(DiagnosisSettings(), fit, fitter.channels)
+    assert judge.channels is None
+    assert judge.evidence(fit) == judge.of_displacement(fit)
+
+
+def test_with_channels_the_cost_of_a_fit_is_still_that_of_the_displacement():
+    made = record()
+    seen = made.displacement - made.displacement[: made.lead_in].mean()
+    both = ActuatorRecord("made", made.drive, seen, 1e-6, lead_in=made.lead_in, electric=made)
+    fitter = Fitter([both], PLAIN, DiagnosisSettings(), workers=1)
+    fitter.read_noise(PLAIN)
+    problem = fitter.problem(with_(LAG))
+    assert isinstance(problem, JointProblem)
+    x = problem.layout.coordinates(problem.layout.initial())
+    fit = fitter.descend(problem, x, 0)
+    alone = JointProblem.alone(problem)
+    assert fit.cost == pytest.approx(float(alone.evaluate(x[None])[0][0]), rel=1e-9)
+    assert fit.residuals.size == alone.measured.size
+    # a lag that the monitor does not show is out of the question
+    judge = Judge(DiagnosisSettings(), fit, fitter.channels)
+    assert judge.criterion(fit) > judge.of_displacement(fit).criterion + 1e5
