@@ -8,10 +8,10 @@
     fit = dearig.identify(run)
     fit.save("model.toml")
 
-``open``, ``record``, ``identify``, ``validate``, ``simulate``, ``diagnose``, ``invert``,
-``track`` and ``hold`` take objects or paths and return values that a notebook displays and that
-have ``plot``, ``to_html`` and ``save``. Nothing is printed; errors are ``DearigError``, each a
-sentence that says what to do.
+``open``, ``record``, ``identify``, ``validate``, ``simulate``, ``sense``, ``diagnose``,
+``invert``, ``track`` and ``hold`` take objects or paths and return values that a notebook displays
+and that have ``plot``, ``to_html`` and ``save``. Nothing is printed; errors are ``DearigError``,
+each a sentence that says what to do.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from dearig.api.predictions import Prediction
     from dearig.api.recordings import Recording, open, record  # noqa: A004
     from dearig.api.results import DiagnoseResult, IdentifyResult, ValidateResult
+    from dearig.api.sensing import SenseResult, sense
     from dearig.api.sequences import Sequence
     from dearig.api.tracking import Inversion, TrackResult, invert, track
     from dearig.errors import (
@@ -55,6 +56,7 @@ __all__ = [
     "Prediction",
     "Recording",
     "SafetyStop",
+    "SenseResult",
     "Sequence",
     "TrackResult",
     "ValidateResult",
@@ -66,6 +68,7 @@ __all__ = [
     "invert",
     "open",
     "record",
+    "sense",
     "simulate",
     "track",
     "validate",
@@ -79,6 +82,7 @@ _MODULES = {
     "dearig.api.predictions": ("Prediction",),
     "dearig.api.recordings": ("Recording", "open", "record"),
     "dearig.api.results": ("DiagnoseResult", "IdentifyResult", "ValidateResult"),
+    "dearig.api.sensing": ("SenseResult", "sense"),
     "dearig.api.sequences": ("Sequence",),
     "dearig.api.tracking": ("Inversion", "TrackResult", "invert", "track"),
     "dearig.errors": (

@@ -1,4 +1,4 @@
-"""Commands on models: demo, identify, validate, diagnose, simulate."""
+"""Commands on models: demo, identify, validate, diagnose, simulate, sense."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from dearig.cli.options import (
     Json,
     ManyToValidate,
     Method,
+    Recording,
     Report,
     RigFileOption,
     Seed,
@@ -417,3 +418,59 @@ def simulate(
         },
         json,
     )
+
+
+@commands.command(rich_help_panel=_PANEL)
+def sense(
+    recording: Recording,
+    model: Annotated[
+        Path, typer.Option(metavar="MODEL.toml", help="Model of the film that was recorded.")
+    ],
+    drive: Annotated[
+        DriveChannel, typer.Option(help="Voltage: the command or the amplifier's monitor.")
+    ] = DriveChannel.command,
+    gain: Annotated[
+        float,
+        typer.Option(
+            help="Charge over that of the model, as the laser of another recording of this rig "
+            "gave it."
+        ),
+    ] = 1.0,
+    gain_error: Annotated[
+        float | None,
+        typer.Option(
+            help="Relative standard uncertainty of the gain.",
+            show_default="0.014: 1 % of the current and of the voltage",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="OUT.csv", help="Write a row for each time to this file."),
+    ] = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Compute the displacement from voltage and current alone.
+
+    Gives its standard error, and compares it with the laser. Takes rows that are means ([card]
+    average) and a voltage that comes back to 0 V.
+    """
+    from dearig.analysis.sense import CHARGE_ERROR, save_sensed, sense_recording
+    from dearig.report.sensed import sense_json, sensed_texts
+
+    check_files(force, (recording, model), *optional(out), json=json)
+    with working(json) as (console, _):
+        outcome = sense_recording(
+            recording,
+            model,
+            drive=drive.value,
+            gain=gain,
+            gain_error=CHARGE_ERROR if gain_error is None else gain_error,
+        )
+        if out is not None:
+            save_sensed(outcome, out, force)
+    for text in sensed_texts(outcome):
+        print_line(console, text)
+    if out is not None:
+        print_line(console, f"Table: {out}")
+    write_result(sense_json(outcome), json)
