@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dearig.analysis.readings.opening import Source
-from dearig.analysis.sense import CHARGE_ERROR, SenseOutcome, save_sensed, sense_recording
+from dearig.analysis.readings.sense import CHARGE_ERROR, SenseOutcome, save_sensed, sense_recording
 from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing
 from dearig.api.models import ModelSource, as_model_file
@@ -28,7 +28,7 @@ class SenseResult:
 
     Attributes
     ----------
-    outcome : dearig.analysis.sense.SenseOutcome
+    outcome : dearig.analysis.readings.sense.SenseOutcome
         All values, with the offset and the conduction of the current that were found.
     """
 

@@ -455,7 +455,7 @@ def sense(
     Gives its standard error, and compares it with the laser. Takes rows that are means ([card]
     average) and a voltage that comes back to 0 V.
     """
-    from dearig.analysis.sense import CHARGE_ERROR, save_sensed, sense_recording
+    from dearig.analysis.readings.sense import CHARGE_ERROR, save_sensed, sense_recording
     from dearig.report.sensed import sense_json, sensed_texts
 
     check_files(force, (recording, model), *optional(out), json=json)

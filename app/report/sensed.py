@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dearig.analysis.sense import SenseOutcome
+from dearig.analysis.readings.sense import SenseOutcome
 from dearig.report.text.numbers import significant
 
 __all__ = ["sense_json", "sensed_texts"]
