@@ -53,6 +53,7 @@ from dearig.model.fitting import GivenValue
 from dearig.model.fitting.prediction import prediction_gain
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
+from dearig.model.verdict import PARTLY_EXPLAINED, UNEXPLAINED
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
 from dearig.recording.reading.recording import Recording
@@ -284,7 +285,8 @@ def _search_and_separate(
         if finding.interrupted or len(performed) >= experiments:
             return readings, finding, performed, None
         noise = _noise(readings)
-        experiment, words = experiment_of(finding, noise, settings.rig)
+        left = finding.verdict in (PARTLY_EXPLAINED, UNEXPLAINED)
+        experiment, words = experiment_of(finding, noise, settings.rig, left)
         if experiment is None:
             return readings, finding, performed, None
         name = _experiment_name(len(performed))
@@ -395,12 +397,6 @@ def _outcome(
         for stand, stage in zip(stands, models, strict=True)
     )
     noise = _noise(fitted)
-    experiment, words = (
-        None,
-        "No experiment is proposed: the recordings are of films, which no voltage sequence drives.",
-    )
-    if fitted[0].kind == "actuator":
-        experiment, words = experiment_of(finding, noise, settings.rig)
     seconds = clock() - started
     said = (*quality, *dict.fromkeys(failed))
     recordings = recordings_of(fitted)
@@ -416,8 +412,11 @@ def _outcome(
         finding=finding,
         stands=stands,
         noise=noise,
-        experiment=experiment,
-        experiment_words=words,
+        experiment=None,
+        experiment_words=(
+            "No experiment is proposed: the recordings are of films, which no voltage sequence "
+            "drives."
+        ),
         quality=said,
         seconds=seconds,
         performed=tuple(performed),
@@ -428,9 +427,13 @@ def _outcome(
         prediction_errors=prediction_errors(
             [r for r in others if r.name in compared], finding.final
         ),
-        gain=_gain(stands, own, noise) if finding.steps else None,
+        # what happened in the training recordings alone is for no other recording to confirm
+        gain=_gain(stands, own, noise) if any(s.may_recur for s in finding.steps) else None,
     )
     outcome = with_excitation(outcome, settings.rig)
+    if outcome.kind == "actuator":
+        experiment, words = experiment_of(finding, noise, settings.rig, outcome.is_rejected)
+        outcome = replace(outcome, experiment=experiment, experiment_words=words)
     if not outcome.recommends_final:
         plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)
         outcome = replace(outcome, model=plain)
@@ -481,8 +484,14 @@ def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
         if found is None:
             return comparison
         # the model of a training recording contains its events already
-        left = found.rms if comparison.role == "validation" else None
-        return replace(comparison, events=found.events, rms_without_events=left)
+        if comparison.role != "validation":
+            return replace(comparison, events=found.events)
+        return replace(
+            comparison,
+            events=found.events,
+            rms_without_events=found.rms,
+            rms_without_drift=found.rms_without_drift,
+        )
 
     return replace(
         stand, train=tuple(map(of, stand.train)), validation=tuple(map(of, stand.validation))

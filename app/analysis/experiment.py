@@ -40,6 +40,7 @@ from dearig.model.simulation.excitation import THESIS_AMPLITUDES
 
 __all__ = [
     "SEPARATES",
+    "SHARED",
     "candidates",
     "determining_record",
     "experiment_of",
@@ -50,6 +51,9 @@ __all__ = [
 
 #: RMS difference of two predictions, in noise floors, from which an experiment separates them.
 SEPARATES = 0.5
+
+#: Probability from which a family that is not named shares it: one in twenty.
+SHARED = 0.05
 
 # factors of the amplitudes, tried in turn until a sequence can be played and measured
 _SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
@@ -306,21 +310,45 @@ def _and(names: Sequence[str]) -> str:
 
 
 def experiment_of(
-    finding: Diagnosis, noise: float, rig_file: RigFile
+    finding: Diagnosis, noise: float, rig_file: RigFile, rejected: bool = False
 ) -> tuple[SeparatingExperiment | None, str]:
-    """Return the experiment that separates the final model from its rivals, and a sentence."""
+    """Return the experiment that separates the final model from its rivals, and a sentence.
+
+    Rivals are the families that explain the data as well, and those that share the probability.
+    Where the final model is ``rejected``, they are the most probable of all others.
+    """
     final = finding.final.model
-    if not isinstance(final, Actuator) or not finding.rivals:
-        return None, "No other family explains these data as well: there is nothing to separate"
-    contested = [s for s in finding.steps if s.indistinguishable_from] or list(finding.steps)
-    label = " with ".join(name for name, _ in final.effects) or "the baseline"
-    family = contested[0].family if contested else "none"
-    rivals = [(label, family, final)]
-    for family_of, model in finding.rivals:
+    if not isinstance(final, Actuator):
+        return None, "No experiment is proposed: films are driven by no voltage sequence"
+    shared = {family for family, p in finding.marginals if p >= SHARED}
+    known = {family for family, _ in finding.rivals}
+    others = [
+        (family, model)
+        for family, model in finding.runners_up
+        if family not in known and (rejected or family in shared)
+    ]
+    rivals = [(_model_label(final), _contested(finding), final)]
+    for family, model in (*finding.rivals, *others):
         if isinstance(model, Actuator):
-            label = " with ".join(name for name, _ in model.effects) or "the baseline"
-            rivals.append((label, family_of, model))
-    return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)
+            rivals.append((_model_label(model), family, model))
+    if len(rivals) > 1:
+        return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)
+    if rejected:
+        return None, (
+            "The model leaves more than noise, and no other was fitted that an experiment could "
+            "separate from it: record other amplitudes and frequencies, and diagnose them together"
+        )
+    return None, "No other family explains these data as well: there is nothing to separate"
+
+
+def _contested(finding: Diagnosis) -> str:
+    """Return the family of the effect that rivals contest."""
+    contested = [s for s in finding.steps if s.indistinguishable_from] or list(finding.steps)
+    return contested[0].family if contested else "none"
+
+
+def _model_label(model: Actuator) -> str:
+    return " with ".join(name for name, _ in model.effects) or "the baseline"
 
 
 @for_simulations()

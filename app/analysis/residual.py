@@ -1,10 +1,10 @@
-"""Autocorrelation and spectrum of a residual, which distinguish it from noise."""
+"""Correlations, quantiles and spectrum of a residual, which distinguish it from noise."""
 
 from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["autocorrelation", "even", "spectrum"]
+__all__ = ["autocorrelation", "cross_correlation", "even", "quantiles", "spectrum"]
 
 _SAMPLES_MAX = 2**20  # a longer transform is slower and shows nothing more
 
@@ -30,6 +30,46 @@ def autocorrelation(step: float, residual: np.ndarray) -> tuple[np.ndarray, np.n
     product = np.fft.irfft(np.abs(transform) ** 2, 2 * n)[: max(n // 4, 1) + 1]
     product /= product[0] if product[0] > 0.0 else 1.0
     return step * np.arange(1, product.size), product[1:]
+
+
+def cross_correlation(
+    step: float, drive: np.ndarray, residual: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``(lag, correlation)`` (K,) of ``residual`` with ``drive``, both without their means.
+
+    Lags in s are up to a tenth of the record on both sides; at a positive lag the residual is later
+    than the drive. A model that lacks nothing of the response to the drive leaves no correlation.
+    """
+    n = residual.size
+    centred = [values - float(values.mean()) for values in (drive, residual)]
+    size = float(np.linalg.norm(centred[0]) * np.linalg.norm(centred[1]))
+    ahead, behind = (np.fft.rfft(values, 2 * n) for values in centred)
+    product = np.fft.irfft(np.conj(ahead) * behind, 2 * n) / (size or 1.0)
+    reach = max(n // 10, 1)
+    lag = np.arange(-reach, reach + 1)
+    return step * lag, product[lag]  # negative lags are at the end
+
+
+def quantiles(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return quantiles of the normal distribution and those of ``residual``, at most 501.
+
+    Plotting positions are (k - 0.5) / n (Hazen, 1914).
+    """
+    from scipy.special import ndtri
+
+    ordered = np.sort(residual)
+    n = ordered.size
+    # evenly in the normal quantile: both tails are seen, whatever the number of samples
+    ends = float(ndtri(0.5 / n))
+    normal = np.linspace(ends, -ends, min(n, 501))
+    place = n * 0.5 * (1.0 + _erf(normal / np.sqrt(2.0))) - 0.5
+    return normal, np.interp(place, np.arange(n), ordered)
+
+
+def _erf(x: np.ndarray) -> np.ndarray:
+    from scipy.special import erf
+
+    return np.asarray(erf(x))
 
 
 def spectrum(step: float, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

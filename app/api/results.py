@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
@@ -52,6 +54,14 @@ def _named(comparisons: Sequence[Comparison], name: str, others: Sequence[str]) 
     raise InputError(f"{name!r} cannot be plotted; what can is {', '.join(known)}")
 
 
+def _residual(comparisons: Sequence[Comparison], name: str) -> tuple[np.ndarray, np.ndarray]:
+    for comparison in comparisons:
+        if comparison.name == name:
+            return comparison.time, comparison.measured - comparison.model
+    known = ", ".join(c.name for c in comparisons)
+    raise InputError(f"there is no recording {name!r} in this result; it has {known}")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class IdentifyResult:
     """Result of an identification.
@@ -83,6 +93,37 @@ class IdentifyResult:
     def warnings(self) -> tuple[str, ...]:
         """What the operator should know of the recordings and the fit."""
         return warnings_of(self.outcome)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """The covariance (f, f) of the fitted parameters in SI units, without intervals (0, 0)."""
+        return self.outcome.fit.covariance
+
+    @property
+    def covariance_names(self) -> tuple[str, ...]:
+        """The names of the parameters that ``covariance`` is of."""
+        return self.outcome.fit.covariance_names
+
+    def residual(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residual on one recording.
+
+        Parameters
+        ----------
+        name : str
+            The name of the recording.
+
+        Returns
+        -------
+        time, residual : numpy.ndarray
+            Both (N,), in s and in m or Pa: measured minus model, NaN where a reading must not be
+            used.
+
+        Raises
+        ------
+        InputError
+            If no recording has that name.
+        """
+        return _residual((*self.outcome.train, *self.outcome.validation), name)
 
     def plot(self, what: str = "overview") -> Figure:
         """Plot the fit.
@@ -197,6 +238,27 @@ class ValidateResult:
     def warnings(self) -> tuple[str, ...]:
         """What the operator should know of the recordings."""
         return warnings_of(self.outcome)
+
+    def residual(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residual on one recording.
+
+        Parameters
+        ----------
+        name : str
+            The name of the recording.
+
+        Returns
+        -------
+        time, residual : numpy.ndarray
+            Both (N,), in s and in m or Pa: measured minus model, NaN where a reading must not be
+            used.
+
+        Raises
+        ------
+        InputError
+            If no recording has that name.
+        """
+        return _residual(self.outcome.comparisons, name)
 
     def plot(self, what: str = "") -> Figure:
         """Plot measurement and model.
@@ -345,6 +407,37 @@ class DiagnoseResult:
     def warnings(self) -> tuple[str, ...]:
         """What the operator should know of the recordings and the search."""
         return words.warnings(self.outcome)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """The covariance (f, f) of the fitted parameters in SI units, without intervals (0, 0)."""
+        return self.outcome.finding.final.covariance
+
+    @property
+    def covariance_names(self) -> tuple[str, ...]:
+        """The names of the parameters that ``covariance`` is of."""
+        return self.outcome.finding.final.covariance_names
+
+    def residual(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residual on one recording.
+
+        Parameters
+        ----------
+        name : str
+            The name of the recording.
+
+        Returns
+        -------
+        time, residual : numpy.ndarray
+            Both (N,), in s and in m or Pa: measured minus model, NaN where a reading must not be
+            used.
+
+        Raises
+        ------
+        InputError
+            If no recording has that name.
+        """
+        return _residual((*self.outcome.after.train, *self.outcome.after.validation), name)
 
     def plot(self, what: str = "errors") -> Figure:
         """Plot errors or a recording before and after.

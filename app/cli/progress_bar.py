@@ -5,15 +5,35 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.text import Text
 
 from dearig.cli.console import PrintableConsole
 from dearig.cli.lost_interrupt import raise_lost
 from dearig.printable import printable
 
 __all__ = ["progress"]
+
+
+class _Times(ProgressColumn):
+    """The time so far, and where it is known the time to go, each with its name after it."""
+
+    max_refresh = 0.5
+
+    def render(self, task: Task) -> Text:
+        """Return both times."""
+        past = task.finished_time if task.finished else task.elapsed
+        words = [f"{_clock(past or 0.0)} so far"]
+        if task.time_remaining is not None and not task.finished:
+            words.append(f"about {_clock(task.time_remaining)} to go")
+        return Text(", ".join(words))
+
+
+def _clock(seconds: float) -> str:
+    return str(timedelta(seconds=max(int(seconds), 0)))
 
 
 @contextmanager
@@ -35,9 +55,7 @@ def progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=None),
         TextColumn("{task.percentage:>3.0f} %", markup=False),
-        TimeElapsedColumn(),
-        TextColumn("left", markup=False),
-        TimeRemainingColumn(),
+        _Times(),
         console=console,
         transient=True,
         expand=True,

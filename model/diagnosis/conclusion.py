@@ -48,6 +48,7 @@ from dearig.model.verdict import (
 
 __all__ = ["Conclusion", "conclude", "unnamed_of"]
 
+_RUNNERS_UP = 2  # kept for an experiment: each is simulated under every excitation
 _LEADING = 5  # families whose evidence is given by channel
 _ITERATIONS = 60  # of the last fits, on every sample: all that have a valley to end in end before
 
@@ -165,6 +166,19 @@ class Conclusion:
             return None
         cost, name = min(named)
         return name, cost
+
+    def runners_up(self) -> list[tuple[str, Fit]]:
+        """Return the most probable fits of families that the best one lacks, one of each."""
+        own = {family_of(m) for m in self.found.best.members}
+        score = {
+            members: self.judge.criterion(fit) + self.judge.settings.odds * len(members)
+            for members, fit in self.found.fits.items()
+        }
+        found: dict[str, Fit] = {}
+        for members in sorted(score, key=lambda m: score[m]):
+            for family in sorted({family_of(m) for m in members} - own):
+                found.setdefault(family, self.found.fits[members])
+        return list(found.items())[:_RUNNERS_UP]
 
     def _form(self) -> float:
         """Return the difference of costs by which no two laws are told apart."""
@@ -328,6 +342,7 @@ def conclude(
         missing_after=missing_after,
         unnamed=unnamed,
         rivals=tuple(rivals),
+        runners_up=tuple((family, fit.model) for family, fit in end.runners_up()),
         simulations=fitter.work.simulations,
         interrupted=found.status == "stopped",
         held=held,

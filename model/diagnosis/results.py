@@ -123,6 +123,11 @@ class Step:
     says: tuple[ChannelSays, ...] = ()
 
     @property
+    def may_recur(self) -> bool:
+        """Whether other recordings have the effect too: neither a drift nor what happened once."""
+        return self.family != "drift" and EFFECTS[self.effect].is_reproducible
+
+    @property
     def curve(self) -> Curve | None:
         """Return the form that a general law has found; None for a law with a name."""
         draw = EFFECTS[self.effect].curve
@@ -134,7 +139,8 @@ class Diagnosis:
     """Result of a diagnosis. ``verdict`` is one of the four constants of this module.
 
     ``rivals`` are fitted models that these data do not distinguish from the final one, by family,
-    for the choice of an experiment. ``interrupted`` is True where the operator stopped the search;
+    for the choice of an experiment; ``runners_up`` are the most probable fitted models of other
+    families, one of each. ``interrupted`` is True where the operator stopped the search;
     everything found until then is kept. ``held`` is True where the records declare the voltage
     linear between samples, but the data show that it is held until the next. ``notes`` are
     sentences for the operator. ``status`` is ``complete``, ``stopped`` (by the operator) or
@@ -165,6 +171,7 @@ class Diagnosis:
     status: str = "complete"
     families: tuple[tuple[str, float], ...] = ()
     marginals: tuple[tuple[str, float], ...] = ()
+    runners_up: tuple[tuple[str, Actuator | Strip], ...] = ()
     channels: tuple[ChannelResult, ...] = ()
     channel_evidence: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = ()
     denials: tuple[Denial, ...] = ()

@@ -127,6 +127,9 @@ def estimates_with_intervals(
             estimates.append(Estimate(q.name, q.unit, value, 0.0, math.inf, False, "held"))
             continue
         on = replace(best, problem=finer[0]) if finer is not None and bent[j] else best
+        if held[j]:
+            # freed for its own end alone: that it stays held has been decided by its evidence
+            on = replace(on, gain=math.inf)
         sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already at its upper end
         tick = _ticks(report, ended, len(estimates), shares)
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -9,7 +10,13 @@ import numpy as np
 import pytest
 
 from dearig.acquisition.plan import plan
-from dearig.analysis.experiment import SEPARATES, candidates, separating_experiment
+from dearig.analysis import experiment
+from dearig.analysis.experiment import (
+    SEPARATES,
+    candidates,
+    experiment_of,
+    separating_experiment,
+)
 from dearig.analysis.readings.compatibility import of_rig
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
@@ -18,6 +25,7 @@ from dearig.drivers.settings import CardSettings
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load
 from dearig.model.simulation.actuator import Actuator, Drive
 from tests.deep import mostly_deep
+from tests.tools.diagnosis import RIVAL, finding
 
 NOISE = 1e-6
 
@@ -154,3 +162,31 @@ def test_the_rig_file_takes_on_the_film_that_was_measured():
             name == "kinematics" and settings.as_film().kinematics == "uniaxial"
         )
     assert settings.as_load() == load
+
+
+@pytest.mark.parametrize(
+    ("share", "rejected", "against"),
+    [(0.01, False, ()), (0.2, False, ("amplifier",)), (0.01, True, ("amplifier",))],
+)
+def test_an_experiment_is_sought_where_families_share_or_the_model_is_rejected(
+    monkeypatch, share, rejected, against
+):
+    asked = []
+    monkeypatch.setattr(
+        experiment, "separating_experiment", lambda rivals, *_: (asked.append(rivals), "")
+    )
+    found = replace(
+        finding(rivals=()), runners_up=(("amplifier", RIVAL),), marginals=(("amplifier", share),)
+    )
+    _, words = experiment_of(found, NOISE, RigFile(), rejected)
+    families = [family for rivals in asked for _, family, _ in rivals]
+    assert tuple(families[1:]) == against
+    assert ("nothing to separate" in words) == (not against)
+
+
+def test_there_is_never_nothing_to_separate_under_a_rejected_model():
+    for outcome in (finding(rivals=()), finding(rivals=(), steps=())):
+        proposed, words = experiment_of(outcome, NOISE, RigFile(), rejected=True)
+        assert proposed is None
+        assert "nothing to separate" not in words
+        assert "record other amplitudes" in words

@@ -11,6 +11,7 @@ import pytest
 import dearig
 from dearig.api.rows import Parameter, Rows
 from tests.tools.diagnosis import diagnose_outcome
+from tests.tools.reports import identify_outcome
 
 from .conftest import SLOW_RIG
 
@@ -168,3 +169,17 @@ def test_a_table_of_parameters_has_the_digits_of_the_intervals():
     page = Rows([resistance])._repr_html_()
     for shown in ("4.865", "4.851", "4.879"):
         assert f"{shown} \N{MULTIPLICATION SIGN} 10\N{SUPERSCRIPT SEVEN}" in page
+
+
+def test_residuals_and_covariance_are_arrays() -> None:
+    outcome = diagnose_outcome()
+    found = dearig.DiagnoseResult(outcome)
+    (train,) = outcome.after.train
+    time, residual = found.residual(train.name)
+    np.testing.assert_array_equal(time, train.time)
+    np.testing.assert_array_equal(residual, train.measured - train.model)
+    with pytest.raises(dearig.InputError, match="no recording 'x' in this result; it has"):
+        found.residual("x")
+    fitted = dearig.IdentifyResult(identify_outcome())
+    assert fitted.covariance.shape == (len(fitted.covariance_names),) * 2
+    assert fitted.residual("train.h5")[1].shape == fitted.residual("train.h5")[0].shape

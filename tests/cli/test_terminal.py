@@ -3,12 +3,14 @@ from __future__ import annotations
 import io
 import json
 import math
+import threading
 
 import pytest
 from rich.console import Console
+from rich.progress import ProgressSample, Task, TaskID
 
 from dearig.cli.lost_interrupt import note_lost
-from dearig.cli.progress_bar import progress
+from dearig.cli.progress_bar import _Times, progress
 from dearig.cli.terminal import branch_table, identify_table, validate_tables
 from dearig.errors import InputError
 from dearig.recording.json_file import write_json
@@ -132,6 +134,17 @@ class TestProgress:
         assert "75 %" in last
         # a new stage does not take the bar back to its beginning
         assert " 0 %" not in text.partition("diagnosing: baseline")[2]
+
+    def test_each_time_of_the_bar_has_its_name_after_it(self):
+        task = Task(TaskID(0), "", 1.0, 0.25, _get_time=lambda: 102.0, _lock=threading.RLock())
+        task.start_time = 0.0
+        assert str(_Times().render(task)) == "0:01:42 so far"
+        for at, done in ((90.0, 0.1), (100.0, 0.5)):
+            task._progress.append(ProgressSample(at, done))
+        remaining = task.time_remaining
+        assert remaining is not None
+        shown = f"0:01:42 so far, about 0:00:{int(remaining):02d} to go"
+        assert str(_Times().render(task)) == shown
 
     def test_survives_an_exception(self):
         stream = io.StringIO()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dearig.report.figures.defaults import style
+from dearig.report.figures.defaults import style, text_size
 from dearig.report.figures.style import (
     MARK,
     MEASURED,
@@ -34,8 +34,17 @@ if TYPE_CHECKING:
     from dearig.analysis.outcomes import BranchTrial
     from dearig.model.fitting import Estimate, Identification
 
-__all__ = ["branches_figure", "parameter_columns", "parameters_figure"]
+__all__ = [
+    "branches_figure",
+    "correlation_columns",
+    "correlation_figure",
+    "correlations",
+    "parameter_columns",
+    "parameters_figure",
+]
 
+#: Parameters up to which a matrix has numbers, and the correlation from which its cells are dark.
+_NUMBERS_MAX, _DARK = 14, 0.6
 #: Width in inches from which the legend of parameters has two columns.
 _LEGEND_TWO = 4.0
 
@@ -86,6 +95,44 @@ def parameter_columns(fit: Identification) -> tuple[tuple[str, list[object]], ..
     names = ("parameter", "unit", "value", "low95", "high95", "determined", "thesis_table_3")
     columns = zip(*rows, strict=True)
     return tuple((name, list(column)) for name, column in zip(names, columns, strict=True))
+
+
+def correlations(covariance: np.ndarray) -> np.ndarray:
+    """Return the correlation matrix (f, f) of a ``covariance`` (f, f)."""
+    sigma = np.sqrt(np.diag(covariance))
+    sigma = np.where(sigma > 0.0, sigma, 1.0)  # of one at a bound: its row is 0
+    return np.asarray(covariance / sigma / sigma[:, None])
+
+
+def correlation_columns(
+    names: Sequence[str], covariance: np.ndarray
+) -> tuple[tuple[str, list[object]], ...]:
+    """Return the data of ``correlation_figure``."""
+    matrix = correlations(covariance)
+    return (("parameter", list(names)), *((n, list(matrix[:, i])) for i, n in enumerate(names)))
+
+
+def correlation_figure(names: Sequence[str], covariance: np.ndarray) -> Figure:
+    """Draw the correlation of parameters ``names`` as a matrix with numbers."""
+    matrix, count = correlations(covariance), len(names)
+    labels = [drawable(symbol(n).replace("_", " "), 22) for n in names]
+    with style():
+        figure = blank(WIDTH, 2.0 + 0.26 * count)
+        ax = figure.subplots()
+        # cells are drawn as shapes: a page shows no pictures of points
+        ax.pcolormesh(range(count), range(count), matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+        ax.invert_yaxis()
+        ax.set_xticks(range(count), labels, rotation=45, ha="right", rotation_mode="anchor")
+        ax.set_yticks(range(count), labels)
+        ax.grid(visible=False)
+        if count <= _NUMBERS_MAX:
+            for (row, column), value in np.ndenumerate(matrix):
+                colour = "white" if abs(value) > _DARK else MARK
+                ax.text(
+                    column, row, f"{value:.2f}", ha="center", va="center", color=colour,
+                    fontsize=text_size(7.5),
+                )  # fmt: skip
+    return figure
 
 
 def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:

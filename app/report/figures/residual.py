@@ -1,4 +1,4 @@
-"""Figures of one residual: histogram, autocorrelation and spectrum."""
+"""Figures of one residual: histogram, quantiles, correlations and spectrum."""
 
 from __future__ import annotations
 
@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dearig.analysis.residual import autocorrelation, even, spectrum
+from dearig.analysis.decimate import decimate
+from dearig.analysis.residual import (
+    autocorrelation,
+    cross_correlation,
+    even,
+    quantiles,
+    spectrum,
+)
 from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
+    COLUMNS,
     MEASURED,
     MODEL,
     NOISE,
@@ -43,15 +51,24 @@ def residual_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def residual_panels(comparison: Comparison) -> tuple[Figure, Figure, Figure]:
-    """Draw the panels of ``residual_figure`` as three figures, for a page that arranges them."""
+def residual_panels(comparison: Comparison) -> tuple[tuple[Figure, str], ...]:
+    """Draw every panel as a figure of its own, with its caption."""
     figures = []
     with style():
-        for draw in _RESIDUAL_PANELS:
+        for draw, caption in (
+            (_histogram, f"Histogram of the error{bin_text(comparison)}, and that of noise alone."),
+            (_correlation, "Autocorrelation of the error; that of noise lies in the grey band."),
+            (_spectrum, "Amplitude density of the error; that of white noise is flat."),
+            (_quantiles, "Quantiles of the error against those of a normal distribution (Q-Q)."),
+            (
+                _cross_correlation,
+                "Correlation of the error with the drive: the response that the model lacks.",
+            ),
+        ):
             figure = blank(0.6 * WIDTH, 2.5)
             draw(figure.subplots(), comparison)
-            figures.append(figure)
-    return figures[0], figures[1], figures[2]
+            figures.append((figure, caption))
+    return tuple(figures)
 
 
 def _histogram(ax: Axes, comparison: Comparison) -> None:
@@ -122,6 +139,37 @@ def _correlation(ax: Axes, comparison: Comparison) -> None:
     ax.set_yticks([-0.5, 0.0, 0.5, 1.0] if correlation.min() < -0.4 else [0.0, 0.5, 1.0])
     ax.set_xlabel("Lag (s)")
     ax.set_ylabel("Autocorrelation")
+    legend(ax)
+
+
+def _quantiles(ax: Axes, comparison: Comparison) -> None:
+    shown = SHOWN[comparison.kind]
+    normal, own = quantiles(_residual(comparison) * shown.error_factor)
+    ax.plot(normal, own, ".", color=MEASURED, markersize=3, label="residual")
+    if comparison.noise:
+        noise = comparison.noise * shown.error_factor
+        ends = normal[[0, -1]]
+        ax.plot(ends, noise * ends, color=MODEL, linewidth=1.4, label="noise")
+    ax.set_xlabel("Normal quantile (standard deviations)")
+    ax.set_ylabel(shown.error_label)
+    few_ticks(ax, x=5, y=5)
+    legend(ax)
+
+
+def _cross_correlation(ax: Axes, comparison: Comparison) -> None:
+    step, residual = even(comparison.time, _residual(comparison))
+    _, drive = even(comparison.time, comparison.drive)
+    lag, correlation = cross_correlation(step, drive, residual)
+    chance = 2.0 / math.sqrt(residual.size)
+    ax.axhspan(-chance, chance, color=NOISE, linewidth=0, zorder=0.5, label="95 % of white noise")
+    ax.axhline(0.0, color=UNSURE, linewidth=0.6, zorder=0.6)
+    ax.plot(*decimate(lag, correlation, COLUMNS // 2), color=MEASURED, linewidth=1.1)
+    reach = max(0.1, 1.15 * float(np.max(np.abs(correlation))))
+    ax.set_ylim(-reach, reach)
+    ax.set_xlim(lag[0], lag[-1])
+    ax.set_xlabel("Lag behind the drive (s)")
+    ax.set_ylabel("Correlation with the drive")
+    few_ticks(ax, x=5, y=5)
     legend(ax)
 
 

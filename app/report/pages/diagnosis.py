@@ -12,7 +12,7 @@ import numpy as np
 
 from dearig.report.figures import diagnosis as drawn
 from dearig.report.figures.recordings import comparison_figure
-from dearig.report.figures.residual import bin_text, residual_panels
+from dearig.report.figures.residual import residual_panels
 from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.html import Picture, fitted_rows, picture, prefixes, write_page
 from dearig.report.pages.laws import LawView, law_view
@@ -342,18 +342,13 @@ def _validation_pictures(
 def _after_pictures(
     outcome: DiagnoseOutcome, worst: list[Signature], names: Iterator[str]
 ) -> tuple[Picture, ...]:
-    """Draw histogram, correlation and spectrum of the final residual of the worst recording."""
+    """Draw what distinguishes the final residual of the worst recording from noise."""
     chosen = [c for c in outcome.after.train if worst and c.name == worst[0].record]
     if not chosen:
         return ()
-    captions = (
-        f"histogram of the error{bin_text(chosen[0])}, and the distribution of noise alone.",
-        "autocorrelation of the error; that of noise lies in the grey band.",
-        "amplitude density of the error; that of white noise is flat.",
-    )
     return tuple(
-        picture(figure, names, f"{chosen[0].name}, after: {caption}")
-        for figure, caption in zip(residual_panels(chosen[0]), captions, strict=True)
+        picture(figure, names, f"{chosen[0].name}, after: {caption[:1].lower()}{caption[1:]}")
+        for figure, caption in residual_panels(chosen[0])
     )
 
 

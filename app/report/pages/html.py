@@ -15,11 +15,13 @@ from dearig.report.figures.data import Column, csv_url, figure_columns, to_csv
 from dearig.report.figures.export import svg
 from dearig.report.figures.parameters import (
     branches_figure,
+    correlation_columns,
+    correlation_figure,
     parameter_columns,
     parameters_figure,
 )
 from dearig.report.figures.recordings import comparison_figure, loop_figure
-from dearig.report.figures.residual import bin_text, residual_panels
+from dearig.report.figures.residual import residual_panels
 from dearig.report.made import made, made_now, one_time
 from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.pdf import check_browser, is_pdf, write_pdf
@@ -290,7 +292,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
     pictures = [("Training", tuple(others))] if others else []
     if outcome.validation:
         pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
-    parameter_pictures = (
+    parameter_pictures: tuple[Picture, ...] = (
         picture(
             parameters_figure(fit),
             prefixes,
@@ -301,6 +303,16 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             parameter_columns(fit),
         ),
     )
+    if fit.covariance.size > 1:
+        parameter_pictures += (
+            picture(
+                correlation_figure(fit.covariance_names, fit.covariance),
+                prefixes,
+                "Correlation of the fitted parameters. Near 1 or -1 the data determine a "
+                "combination of two parameters better than each of them.",
+                correlation_columns(fit.covariance_names, fit.covariance),
+            ),
+        )
     branch_tables: tuple[Table, ...] = ()
     branch_pictures: tuple[Picture, ...] = ()
     springs: tuple[Table, ...] = ()
@@ -442,12 +454,6 @@ def fitted_rows(
 
 
 def _residual_pictures(comparison: Comparison, prefixes: Iterator[str]) -> tuple[Picture, ...]:
-    captions = (
-        f"Histogram of the error{bin_text(comparison)}, and the distribution of noise alone.",
-        "Autocorrelation of the error; that of noise lies in the grey band.",
-        "Amplitude density of the error; that of white noise is flat.",
-    )
     return tuple(
-        picture(figure, prefixes, caption)
-        for figure, caption in zip(residual_panels(comparison), captions, strict=True)
+        picture(figure, prefixes, caption) for figure, caption in residual_panels(comparison)
     )

@@ -89,7 +89,7 @@ class RunDisplay(QWidget):
         """Show the plan of the session; during a run nothing changes."""
         if self._running:
             return
-        preview = self._session.preview
+        preview = self._session.preview or self._session.outline
         self._stop_drawing()
         self.view.show_planned(preview)
         self.plots.show_prediction(preview)

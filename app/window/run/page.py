@@ -354,6 +354,7 @@ class RunPage(Page):
         self.runner.status.acknowledged.connect(self.alarms.acknowledge)
         session.preview_changed.connect(self._refresh)
         session.preview_changed.connect(self.display.show_planned)
+        session.outline_changed.connect(self.display.show_planned)
         session.sequence_changed.connect(self._refresh)
         session.sequence_changed.connect(self.display.show_planned)
         session.rig_changed.connect(self._forget_result)

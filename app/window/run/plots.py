@@ -229,18 +229,18 @@ class RunPlots(QWidget):
             self._low[name], self._high[name] = -least, least
         self._duration = 1.0
         self._marks.clear()
-        plan = None if preview is None else preview.plan
-        if preview is not None and plan is not None:
-            self._duration = plan.duration
+        planned = preview is not None and (preview.plan is not None or preview.is_outline)
+        if preview is not None and planned:
+            self._duration = preview.duration
             self.digest = preview.digest
             for name in ("voltage", "displacement"):
                 x, y = preview.curves[name]
                 self._include(name, y)
                 self._planned[name].set_points(x, y * _SCALE[name])
             self._draw_band(*preview.curves["voltage"])
-        self._planned_shown, self._run_shown = plan is not None, False
+        self._planned_shown, self._run_shown = planned, False
         for name in _UNPREDICTED:
-            self.overlays[name].show_words("measured during the run" if plan is not None else "")
+            self.overlays[name].show_words("measured during the run" if planned else "")
         self._show_levels()
         self._name()
         self._draw_marks()

@@ -34,6 +34,8 @@ def planned_text(preview: Preview | None) -> str:
     """Return what the plots show before a run: name, peak voltage and duration of the plan."""
     if preview is None:
         return "Planned: the plan is being made …"
+    if preview.is_outline:
+        return f"Preview, the model is being compiled: {preview.sentence}, {preview.duration:.1f} s"
     if preview.plan is None or preview.loaded is None:
         return "Planned: nothing, the sequence cannot be played"
     volts = preview.curves["voltage"][1]
@@ -109,7 +111,7 @@ class RunView(QWidget):
         if preview is not None and preview.plan is not None:
             tip = f"{preview.plan.samples:,} samples at {preview.plan.rate:g} Hz"
             self.words.setToolTip(f"{tip} on {self._session.address}")
-        if preview is not None and not preview.playable:
+        if preview is not None and not (preview.playable or preview.is_outline):
             set_role(self.words, "bad")
 
     def show_last(self) -> None:

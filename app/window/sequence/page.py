@@ -61,6 +61,7 @@ class SequencePage(Page):
         session.sequence_changed.connect(self._sequence_changed)
         session.rig_changed.connect(self.preview.show_planning)
         session.preview_changed.connect(self._preview_changed)
+        session.outline_changed.connect(self._outline_changed)
         session.recent_changed.connect(self._recent_changed)
         session.theme_changed.connect(self._theme_changed)
         self._theme_changed()
@@ -189,6 +190,11 @@ class SequencePage(Page):
         else:
             self.editor.show_durations(s.duration for s in preview.loaded.sequence.segments)
         self._highlight()
+
+    @Slot()
+    def _outline_changed(self) -> None:
+        if self.session.outline is not None:
+            self.preview.show_outline(self.session.outline)
 
     def _block_arming(self, preview: Preview) -> None:
         """Block arming while the sequence cannot be played, and say where and why."""

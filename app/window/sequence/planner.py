@@ -16,9 +16,11 @@ from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError, Interrupted
 from dearig.progress import Progress, quiet
 from dearig.window.jobs.background import Background
+from dearig.window.jobs.worker import Worker
 from dearig.window.kit.fields import in_words
 from dearig.window.run.traces import Pyramid
 from dearig.window.sequence.limit_marks import RowPeaks, fields_beyond, rows_beyond
+from dearig.window.sequence.outline import outline
 from dearig.window.session.state import Breach, Preview, Session
 
 __all__ = ["Planner", "make_preview"]
@@ -29,6 +31,7 @@ _BREACHES_MAX = 50  # time spans marked in one plot; more are drawn as one
 class Planner(QObject):
     """Keeps ``session.preview`` up to date with the sequence, the rig file and the film.
 
+    While the model is compiled, an outline by kernels that are not is made in another process.
     A plan that is no longer wanted ends at its next piece. ``progressed`` carries the part of the
     present plan that is done, 0 to 1.
     """
@@ -40,6 +43,7 @@ class Planner(QObject):
         self._session = session
         self._wanted = 0  # number of the newest plan
         self._held = False
+        self._outlines = Worker(self)
         self._background = Background(self)
         self._background.done.connect(self._done)
         session.sequence_changed.connect(self.renew)
@@ -51,6 +55,7 @@ class Planner(QObject):
         s = self._session
         s.preview = None
         if self._held:
+            self._outline()
             return
         toml, folder, rig_file, film = s.sequence_toml, s.sequence_folder, s.rig_file, s.film
         self._wanted = number = self._wanted + 1
@@ -67,16 +72,36 @@ class Planner(QObject):
         """Make no plans while the model is being compiled; afterwards make the newest."""
         if held != self._held:
             self._held = held
+            if not held:
+                self._outlines.close()
+                self._session.set_outline(None)
             self.renew()
 
     def close(self) -> None:
         """End the plan, and wait for the thread."""
         self._wanted += 1
+        self._outlines.close()
         self._background.close()
+
+    def _outline(self) -> None:
+        s = self._session
+        self._wanted = number = self._wanted + 1
+        s.set_outline(None)  # it was that of another sequence
+        self._outlines.clear()
+        self._outline_job = job = self._outlines.submit(
+            outline, s.sequence_toml, str(s.sequence_folder), s.rig_text
+        )
+
+        def take(found: Preview | None) -> None:
+            if self._held and number == self._wanted:
+                s.set_outline(found)
+
+        job.finished.connect(take)
 
     @Slot(object)
     def _done(self, preview: Preview) -> None:
-        self._session.set_preview(preview)
+        if not self._held:  # one that was begun before is made again
+            self._session.set_preview(preview)
 
 
 def make_preview(

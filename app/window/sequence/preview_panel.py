@@ -14,6 +14,8 @@ from dearig.window.session.state import Preview, Session
 
 __all__ = ["PreviewPanel"]
 
+#: What is said of curves that are drawn before the model is compiled.
+OUTLINE = "Preview: the limits are judged, and it can be armed, once the model is compiled"
 _MARGINS_MAX = 6
 _FAULTS_MAX = 6  # more do not fit below the plots of a small screen; the table marks all
 #: Time in ms for which the last plan stays drawn, so that the plots do not flicker while one types.
@@ -49,6 +51,12 @@ class PreviewPanel(QWidget):
         """Say how much of a plan is made, once it takes so long that the last one is removed."""
         if not self._clear.isActive():
             self.state.show_text(f"Planning … {part:.0%}", "muted")
+
+    def show_outline(self, outline: Preview) -> None:
+        """Show the curves of a plan that is not judged yet."""
+        self._clear.stop()
+        self.plots.show_preview(outline)
+        self.state.show_text(OUTLINE, "muted")
 
     def show_preview(self, preview: Preview) -> None:
         """Show a plan, or why there is none."""

@@ -62,7 +62,7 @@ class PreviewPlots(PlotArea):
         Without a prediction nothing is drawn: an old curve belongs to another sequence.
         """
         self._preview = preview
-        planned = preview is not None and preview.plan is not None
+        planned = preview is not None and (preview.plan is not None or preview.is_outline)
         curves = {} if preview is None else preview.curves
         for name, curve in self._curves.items():
             x, y = curves.get(name, (np.empty(0), np.empty(0)))
@@ -76,7 +76,7 @@ class PreviewPlots(PlotArea):
                 words = "prediction up to where a limit is exceeded or the model fails"
             self._plots[name].set_note(words)
         self._mark()
-        if preview is None or preview.plan is None:
+        if preview is None or not planned:
             return
         self.file_stem = (
             "planned sequence" if preview.loaded is None else preview.loaded.sequence.name

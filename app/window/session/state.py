@@ -53,7 +53,8 @@ class Preview:
 
     ``curves`` are (time in s, value in SI units) of voltage, displacement and field, decimated with
     their extremes kept; ``segments`` are label, begin and end in s, with lead-in and tail.
-    ``faults`` are those of the rows and fields of the sequence, all of them.
+    ``faults`` are those of the rows and fields of the sequence, all of them. An outline has the
+    curves of a plan by kernels that are not compiled, and its name as ``sentence``; it is no plan.
     """
 
     toml: str
@@ -64,11 +65,19 @@ class Preview:
     breaches: tuple[Breach, ...] = ()
     segments: tuple[tuple[str, float, float], ...] = ()
     faults: tuple[SequenceFault, ...] = ()
+    is_outline: bool = False
 
     @property
     def playable(self) -> bool:
         """True if the gate accepts the plan."""
         return self.plan is not None and self.plan.waveform is not None
+
+    @property
+    def duration(self) -> float:
+        """Time in s from the first to the last sample, 0 without a plan."""
+        if self.plan is not None:
+            return self.plan.duration
+        return float(self.segments[-1][2]) if self.is_outline else 0.0
 
     @property
     def digest(self) -> str:
@@ -89,6 +98,7 @@ class Session(QObject):
     rig_changed = Signal()
     sequence_changed = Signal()
     preview_changed = Signal()
+    outline_changed = Signal()  #: an outline of the plan is there, or none any more
     overlays_changed = Signal()
     folder_changed = Signal()
     notes_changed = Signal()
@@ -124,6 +134,7 @@ class Session(QObject):
         self.sequence_folder = Path()
         self.sequence_path: Path | None = None
         self.preview: Preview | None = None
+        self.outline: Preview | None = None
         self.overlays: tuple[OverlayModel, ...] = (self.thesis_model,)
         self.overlay_drive = "command"
         self.folder = folder
@@ -216,6 +227,11 @@ class Session(QObject):
 
     def _hold_conditions(self) -> tuple[object, ...]:
         return self.sequence_toml, self.address, self.rig_file, self.film
+
+    def set_outline(self, outline: Preview | None) -> None:
+        """Set what is shown of the plan until the model is compiled; None for nothing."""
+        self.outline = outline
+        self.outline_changed.emit()
 
     def set_preview(self, preview: Preview) -> None:
         """Set the plan of the present sequence."""

@@ -72,3 +72,12 @@ def test_branches_that_the_data_keep_apart_make_no_sum() -> None:
     fit = identify([record_of(APART, thesis_drive(rate=100.0))], APART)
     assert fit.sums == ()
     assert {e.name for e in fit.estimates if e.determined} == {"mu_0", "mu_1", "mu_2", "T_1", "T_2"}
+
+
+def test_a_limit_that_is_held_stays_where_it_is() -> None:
+    """Its own profile frees it, and nearly always gains a little."""
+    for seed in range(4):
+        fit = identify([record_of(PLAIN, thesis_drive(rate=100.0), seed=seed)], PLAIN)
+        assert fit.held_limits == ("J_0", "J_1")
+        limits = {e.name: e.value for e in fit.estimates if e.name in fit.held_limits}
+        assert limits == pytest.approx({"J_0": 1e4, "J_1": 1e4})

@@ -60,7 +60,7 @@ def test_the_link_holds_the_file():
 @pytest.mark.parametrize("step", [0.1e-6, 0.3e-6, 1.22e-6, 40e-6])
 def test_bins_are_whole_converter_steps(step):
     comparison = actuator_comparison(step=step)
-    bars = residual_panels(comparison)[0].axes[0].containers[0].patches
+    bars = residual_panels(comparison)[0][0].axes[0].containers[0].patches
     widths = {round(bar.get_width() / (step * 1e6), 6) for bar in bars}
     assert len(widths) == 1
     assert widths.pop() % 1.0 == 0.0
@@ -71,7 +71,7 @@ def test_bins_are_whole_converter_steps(step):
 
 def test_bins_of_readings_without_a_step_follow_the_spread():
     assert bin_text(actuator_comparison()) == ""
-    bars = residual_panels(actuator_comparison())[0].axes[0].containers[0].patches
+    bars = residual_panels(actuator_comparison())[0][0].axes[0].containers[0].patches
     assert 12 <= len(bars) <= 60
     assert bars[0].get_width() < 4.0 * NOISE * 1e6
 

@@ -16,7 +16,12 @@ from dearig.errors import InputError
 from dearig.report.figures import recordings as figures
 from dearig.report.figures import style as figure_style
 from dearig.report.figures.export import save_png, svg
-from dearig.report.figures.parameters import branches_figure, parameters_figure
+from dearig.report.figures.parameters import (
+    branches_figure,
+    correlation_columns,
+    correlation_figure,
+    parameters_figure,
+)
 from dearig.report.figures.residual import residual_figure, residual_panels
 from tests.tools.reports import (
     TRIALS,
@@ -200,11 +205,26 @@ class TestResidualFigure:
 
     def test_panels_are_the_same_axes(self):
         panels = residual_panels(film_comparison())
-        assert [f.axes[0].get_xlabel() for f in panels] == [
+        assert [f.axes[0].get_xlabel() for f, _ in panels] == [
             "Error (kPa)",
             "Lag (s)",
             "Frequency (Hz)",
+            "Normal quantile (standard deviations)",
+            "Lag behind the drive (s)",
         ]
+
+    def test_correlations_of_parameters_are_those_of_their_covariance(self):
+        covariance = np.array([[4.0, -1.2, 0.0], [-1.2, 1.0, 0.0], [0.0, 0.0, 0.0]])
+        figure = correlation_figure(("mu_1", "T_1", "J_1"), covariance)
+        (cells,) = figure.axes[0].collections
+        np.testing.assert_allclose(
+            cells.get_array(), [[1.0, -0.6, 0.0], [-0.6, 1.0, 0.0], [0.0, 0.0, 0.0]]
+        )
+        assert "<image" not in svg(figure, "f1", "matrix")  # a page may show none
+        assert "-0.60" in [text.get_text() for text in figure.axes[0].texts]
+        names, *columns = correlation_columns(("mu_1", "T_1", "J_1"), covariance)
+        assert names == ("parameter", ["mu_1", "T_1", "J_1"])
+        assert [name for name, _ in columns] == ["mu_1", "T_1", "J_1"]
 
     @pytest.mark.parametrize("noise", [None, 0.0, 1e-12])
     def test_perfect_models_and_odd_noise(self, noise):
