@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dearig.errors import InputError
+from dearig.input_file import parse_json
 from dearig.recording.content.fields import CONDITIONS
 
 __all__ = [
@@ -40,6 +41,8 @@ _CONFOUNDED = 0.99
 #: each is 1/sqrt(1 - 0.8^2) = 1.7 times as wide as without the other one.
 _ENTANGLED = 0.8
 
+#: Units of the cycles before a run.
+_CYCLE_UNITS = (1000, 100, 10, 1)
 #: Units of the time since a film's first run: label, unit, and how many are a day.
 _TIMES = (("days", "day", 1.0), ("hours", "h", 24.0), ("minutes", "min", 1440.0))
 
@@ -101,15 +104,64 @@ def columns_in(
     days = days_of_films(rows, films)
     order = np.argsort(np.where(np.isfinite(days), days, np.inf), kind="stable")
     if any(row.get(_CYCLES) is not None for row in rows):
-        found.append(Covariate("cycles", "1000 cycles", _cycles_before(rows, films, order) / 1e3))
+        found.append(_cycles_column(_cycles_before(rows, films, order)))
     if np.isfinite(days).any():
         found.append(_time_column(days))
     settings = [n for n in dict.fromkeys(n for row in rows for n in row) if n.startswith("set ")]
     for name in settings:
-        values = _numbers(rows, name)
-        if np.isfinite(values).any():
-            found.append(Covariate(name.removeprefix("set "), "", values))
+        found += _setting_columns(name.removeprefix("set "), [row.get(name) for row in rows])
     return found + _rigs(rows, films)
+
+
+def _setting_columns(label: str, values: Sequence[Any]) -> list[Covariate]:
+    """Return the columns of a setting: one, or one for each place of a list of numbers.
+
+    The places are numbered from 0, as in a plan: ``segment.0.amplitudes_kV.0``.
+    """
+    each = [_listed(value) for value in values]
+    places = max((len(value) for value in each), default=0)
+    names = [label]
+    if any(isinstance(_plain(value), list) for value in values):
+        names = [f"{label}.{place}" for place in range(places)]
+    columns = [
+        np.array([value[place] if place < len(value) else math.nan for value in each])
+        for place in range(places)
+    ]
+    return [
+        Covariate(name, "", column)
+        for name, column in zip(names, columns, strict=False)
+        if np.isfinite(column).any()
+    ]
+
+
+def _plain(value: object) -> object:
+    """Return a list that a table (CSV) holds as text; any other value as it is."""
+    if isinstance(value, str) and value.startswith("["):
+        try:
+            return parse_json(value)
+        except ValueError:
+            return value
+    return value
+
+
+def _listed(value: object) -> list[float]:
+    """Return the numbers in a setting, NaN for what is none."""
+    plain = _plain(value)
+    parts = plain if isinstance(plain, list | tuple) else [plain]
+    return [
+        float(v) if isinstance(v, int | float) and math.isfinite(v) else math.nan for v in parts
+    ]
+
+
+def _cycles_column(cycles: np.ndarray) -> Covariate:
+    """Return the column of the cycles, in the largest unit that the runs span.
+
+    A slope per 1000 cycles of runs within 40 would be an extrapolation far beyond them.
+    """
+    span = float(np.ptp(cycles))
+    unit = next((u for u in _CYCLE_UNITS if span >= u), _CYCLE_UNITS[-1])
+    name = f"{unit} cycles" if unit > 1 else "cycle"
+    return Covariate("cycles", name, cycles / unit)
 
 
 def _time_column(days: np.ndarray) -> Covariate:

@@ -154,11 +154,15 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 
 @cache
 def _content_stamp(path: str) -> str:
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    """Return a digest of the file and of its neighbours, whose functions a kernel may contain."""
+    digest = hashlib.sha256(Path(path).read_bytes())
+    for neighbour in sorted(Path(path).parent.glob("*.py")):
+        digest.update(neighbour.read_bytes())
+    return digest.hexdigest()
 
 
 class _Locator(UserProvidedCacheLocator):
-    """Keep a function's kernels under the name of its module and the content of its file.
+    """Keep a function's kernels under the name of its module and the content of its folder.
 
     Numba's own locators use the file's path and modification time, so that each checkout of the
     same sources would compile its kernels again.

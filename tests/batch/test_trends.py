@@ -13,6 +13,7 @@ import pytest
 from dearig.batch.changes import find_jumps, jump_penalty
 from dearig.batch.mixed_model import Sample, fit_linear
 from dearig.batch.table_file import read_table, write_csv, write_parquet
+from dearig.batch.trend_columns import columns_in
 from dearig.batch.trends import Trends, find_trends
 from dearig.errors import InputError
 from tests.tools.command import dearig, done, refused
@@ -243,3 +244,38 @@ def test_unknown_columns_are_named() -> None:
         trends_of(made_rows(0, films=2), numbers=["mu_7"])
     with pytest.raises(InputError, match="'moon' is not in the table"):
         trends_of(made_rows(0, films=2), against=["moon"])
+
+
+def test_every_place_of_a_list_of_numbers_is_a_column() -> None:
+    """The template of a plan varies lists, and a table (CSV) holds them as text."""
+    rows = [
+        {"recording": f"{n}.h5", "set segment.0.amplitudes_kV": value, "set repeat": n}
+        for n, value in enumerate([[6.0], [7.0], "[8.0, 3.0]", "[", None, ["x"]])
+    ]
+    found = {c.label: c.values for c in columns_in(rows, ["F"] * len(rows))}
+    assert list(found) == [
+        "segment.0.amplitudes_kV.0", "segment.0.amplitudes_kV.1", "repeat",
+    ]  # fmt: skip
+    nan = np.nan
+    np.testing.assert_array_equal(
+        found["segment.0.amplitudes_kV.0"], [6.0, 7.0, 8.0, nan, nan, nan]
+    )
+    np.testing.assert_array_equal(
+        found["segment.0.amplitudes_kV.1"], [nan, nan, 3.0, nan, nan, nan]
+    )
+    np.testing.assert_array_equal(found["repeat"], np.arange(6.0))
+
+
+@pytest.mark.parametrize(
+    ("each", "unit", "last"),
+    [(10, "10 cycles", 4.0), (1, "cycle", 4.0), (300, "1000 cycles", 1.2), (50, "100 cycles", 2.0)],
+)
+def test_cycles_are_counted_in_a_unit_that_the_runs_span(each: int, unit: str, last: float) -> None:
+    """A slope per 1000 cycles of runs within 40 was between -100 and 8.6e17 %."""
+    rows = [
+        {"recording": f"{n}.h5", "cycles": each, "started": f"2026-01-0{n + 1}T00:00:00+00:00"}
+        for n in range(5)
+    ]
+    (cycles,) = (c for c in columns_in(rows, ["F"] * 5) if c.label == "cycles")
+    assert cycles.unit == unit
+    assert cycles.values[-1] == pytest.approx(last)

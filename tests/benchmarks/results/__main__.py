@@ -78,6 +78,10 @@ MEASUREMENTS = {
             "tests.benchmarks.bench_daqmx hour",
         ),
     ),
+    "averaging": Measurement(
+        "Noise and cost of rows that are means of conversions",
+        ("tests.benchmarks.bench_averaging", "tests.benchmarks.bench_averaging --cost"),
+    ),
     "plan": Measurement(
         "Processor time and memory of long runs", ("tests.benchmarks.bench_plan --full",)
     ),

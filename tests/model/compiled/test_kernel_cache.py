@@ -74,6 +74,32 @@ def test_a_kernel_is_kept_and_found_again(tmp_path: Path) -> None:
     assert len(indices(cache)) == 1
 
 
+def test_a_kernel_is_compiled_again_when_a_neighbour_that_it_contains_changes(
+    tmp_path: Path,
+) -> None:
+    neighbour = tmp_path / "neighbour.py"
+    (tmp_path / "contains.py").write_text(
+        "from dearig.model.compiled.jit import jit\nfrom neighbour import factor\n\n"
+        "@jit\ndef scaled(x):\n    return factor() * x\n",
+        encoding="utf-8",
+    )
+    values = []
+    for factor in (2.0, 3.0):
+        neighbour.write_text(
+            f"from dearig.model.compiled.jit import jit\n\n@jit\ndef factor():\n"
+            f"    return {factor}\n",
+            encoding="utf-8",
+        )
+        ended = subprocess.run(
+            [sys.executable, "-B", "-c", "import contains; print(contains.scaled(1.0))"],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert ended.returncode == 0, ended.stderr
+        values.append(float(ended.stdout))
+    assert values == [2.0, 3.0]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="modes of this kind are not there on Windows")
 def test_planted_code_in_a_folder_that_others_may_write_to_is_not_run(tmp_path: Path) -> None:
     cache, mark = tmp_path / "cache", tmp_path / "mark"

@@ -419,8 +419,7 @@ class TestJson:
         for step in found["steps"]:
             assert step.keys() == {
                 "effect", "family", "acts_on", "parameters", "train", "selection", "validation",
-                "indistinguishable_from", "evidence", "nearest_named", "curve", "law",
-                "says",
+                "indistinguishable_from", "evidence", "nearest_named", "curve", "law", "says",
             }  # fmt: skip
             assert step["train"].keys() == measures
             assert step["selection"].keys() == plain
