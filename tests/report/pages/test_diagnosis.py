@@ -207,19 +207,6 @@ class TestHeadline:
             assert diagnosis_json(outcome)["verdict_reasons"] == ["validation"]
         assert left("explained", 1.14, steps=(SURE,)).verdict == "explained"
 
-    def test_what_the_parameters_own_error_explains_is_no_missing_effect(self):
-        clean = left("nothing_missing", 2.7, steps=())
-        allowed = replace(clean, prediction_errors=(2.5 * NOISE, 0.0))
-        assert allowed.verdict == "nothing_missing"
-        assert headline(allowed) == "No missing effect found"
-        assert "uncertainty of the fitted parameters is large enough" in summary(allowed)[0]
-        assert replace(clean, prediction_errors=(2.0 * NOISE, 0.0)).judgement.reasons == (
-            "validation",
-        )
-        # beside an effect that was found, the error is the model's
-        found = replace(left("explained", 2.7, steps=(SURE,)), prediction_errors=(9.0, 9.0))
-        assert found.verdict == "partly_explained"
-
     def test_what_moves_before_the_voltage_is_not_called_nothing(self):
         still = left("nothing_missing", 1.0, steps=())
         assert still.verdict == "nothing_missing"
