@@ -484,14 +484,8 @@ def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
         if found is None:
             return comparison
         # the model of a training recording contains its events already
-        if comparison.role != "validation":
-            return replace(comparison, events=found.events)
-        return replace(
-            comparison,
-            events=found.events,
-            rms_without_events=found.rms,
-            rms_without_drift=found.rms_without_drift,
-        )
+        left = found.rms if comparison.role == "validation" else None
+        return replace(comparison, events=found.events, rms_without_events=left)
 
     return replace(
         stand, train=tuple(map(of, stand.train)), validation=tuple(map(of, stand.validation))

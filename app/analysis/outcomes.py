@@ -77,8 +77,7 @@ class Comparison:
     is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
     there (f = 0.2 Hz). ``noise_source`` is where the noise is from, as in
     ``dearig.model.readings.noise``. ``rms_without_events`` is the error in the measured unit
-    without the recording's own drift and ``events``, None where it has none of these,
-    ``rms_without_drift`` that with the events, by which a verdict is made. ``ended``
+    without the recording's own drift and ``events``, None where it has none of these. ``ended``
     says how the run ended if it ended early. ``quiet_count`` are the readings at rest that
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
     ``step`` is the converter step of ``measured``, 0.0 where it is not known; each reading is the
@@ -101,7 +100,6 @@ class Comparison:
     published: Published | None = None
     warnings: tuple[str, ...] = field(default=())
     rms_without_events: float | None = None
-    rms_without_drift: float | None = None
     events: tuple[OneTimeEvent, ...] = ()
     ended: EarlyEnd | None = None
     quiet_count: int = 0
@@ -154,21 +152,15 @@ class Comparison:
         """The error in the measured unit, without the recording's own drift and events."""
         return self.errors.rms if self.rms_without_events is None else self.rms_without_events
 
-    @property
-    def judged_rms(self) -> float:
-        """The error in the measured unit, without the recording's own drift, with its events."""
-        return self.errors.rms if self.rms_without_drift is None else self.rms_without_drift
-
     def over_noise(self, noise: float) -> float:
-        """Return the error, without drift where it is known, over the recording's noise.
+        """Return the error, without events where they are known, over the recording's noise.
 
-        An event that was found here alone may be a law that the model lacks: it counts.
         ``noise`` is that of the training recordings. It counts where the recording's own is not
         known, from no lead-in, or smaller. The upper bound of the noise is taken (two standard
         deviations of a standard deviation from ``quiet_count`` readings): 200 readings give it
         within 10 % only. A film's noise includes the error that its model is allowed.
         """
-        error = self.judged_rms
+        error = self.steady_rms
         allowed = 0.0
         if self.kind == "film":
             from dearig.model.diagnosis.preparation import FILM_MODEL_ERROR

@@ -23,7 +23,6 @@ from dearig.model.fitting.broyden import descend_broyden
 from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.records import ActuatorRecord, Record
 from dearig.model.simulation.actuator import Actuator
-from dearig.model.simulation.strip import Strip
 
 __all__ = ["OneTimeEvent", "Own", "drifts_at_rest", "own_of"]
 
@@ -45,14 +44,13 @@ class Own:
     """What is a recording's own: its ``events``, and whether its reading ``drifts``.
 
     ``rms`` is the model's error in m without them, and without the slow part of a noise that is
-    coloured: over a whole recording it is larger than at rest. ``rms_without_drift`` is the same
-    with the events in it. ``signal`` (N,) in m is what they add to the reading.
+    coloured: over a whole recording it is larger than at rest. ``signal`` (N,) in m is what they
+    add to the reading.
     """
 
     events: tuple[OneTimeEvent, ...]
     drifts: bool
     rms: float
-    rms_without_drift: float
     signal: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False)
 
 
@@ -85,8 +83,7 @@ def own_of(
     judge = Judge(fitter.settings, plain)
     nothing = None
     if plain.problem.noise_drift is not None:
-        coloured = fitter.full[0].noise * math.sqrt(plain.cost)
-        nothing = Own((), False, coloured, coloured)
+        nothing = Own((), False, fitter.full[0].noise * math.sqrt(plain.cost))
     if judge.is_noise(plain):
         return nothing
     ways = [_with_events(fitter, judge, plain)]
@@ -110,26 +107,15 @@ def own_of(
         size, moment = EFFECTS[name].parameters
         found = dict(numbers[name])
         events.append(OneTimeEvent(name, found[moment.name], found[size.name], size.unit))
-    noise, bare = fitter.full[0].noise, fitter.careful_problem(model, 0.0)
-    good = np.isfinite(bare.sigma)
-
-    def error(of: Actuator | Strip) -> np.ndarray:
-        whole = _as_it_is(fitter.careful_problem(of, best.drift))
-        left, own = whole.plain_residuals(), whole.problem.noise_drift
-        return left - own.mean(left) if own and best.drift else left
-
-    def rms(left: np.ndarray) -> float:
-        return noise * float(np.sqrt(np.mean(left[good] ** 2)))
-
-    beside = error(best.model)
-    signal = noise * np.where(good, beside - _as_it_is(bare).plain_residuals(), 0.0)
-    return Own(
-        tuple(sorted(events, key=lambda e: e.time)),
-        best.drift > 0.0,
-        rms(beside),
-        rms(error(model) if added else beside),
-        signal,
-    )
+    whole = _as_it_is(fitter.careful_problem(best.model, best.drift))
+    bare = _as_it_is(fitter.careful_problem(model, 0.0)).plain_residuals()
+    error, own = whole.plain_residuals(), whole.problem.noise_drift
+    error = error - own.mean(error) if own and best.drift else error
+    good = np.isfinite(whole.problem.sigma)
+    noise = fitter.full[0].noise
+    rms = noise * float(np.sqrt(np.mean(error[good] ** 2)))
+    signal = noise * np.where(good, error - bare, 0.0)
+    return Own(tuple(sorted(events, key=lambda e: e.time)), best.drift > 0.0, rms, signal)
 
 
 def drifts_at_rest(

@@ -20,6 +20,7 @@ from dearig.model.simulation.actuator import Drive
 from dearig.report.as_json import diagnosis_json
 from dearig.report.text.diagnosis import headline, summary
 from tests.model.diagnosis.test_excitation import DAMPED, EDGES, FILM, NOISE, STEP, error, motion
+from tests.report.pages.test_diagnosis import left
 from tests.tools.diagnosis import STEP as FOUND
 from tests.tools.diagnosis import diagnose_outcome, film_diagnosis, finding
 
@@ -92,6 +93,18 @@ def test_the_uncertainty_of_the_parameters_is_no_error_of_the_model_either() -> 
     found = outcome("thesis", "rich", prediction_errors=(5.0 * NOISE,))
     assert found.judgement.reasons == ("validation", "excitation")
     assert "within what the uncertainty of the fitted parameters allows" in " ".join(summary(found))
+
+
+def test_what_the_parameters_own_error_explains_is_no_missing_effect() -> None:
+    clean = left("nothing_missing", 2.7, steps=())
+    allowed = replace(clean, prediction_errors=(2.5 * NOISE, 0.0))
+    assert allowed.verdict == "nothing_missing"
+    assert headline(allowed) == "No missing effect found"
+    assert "uncertainty of the fitted parameters is large enough" in summary(allowed)[0]
+    assert replace(clean, prediction_errors=(2.0 * NOISE, 0.0)).judgement.reasons == ("validation",)
+    # beside an effect that was found, the error is the model's
+    found = replace(left("explained", 2.7, steps=(SURE,)), prediction_errors=(9.0, 9.0))
+    assert found.verdict == "partly_explained"
 
 
 def test_a_verdict_says_how_far_it_was_tested() -> None:

@@ -212,7 +212,7 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
     if "validation" in reasons:
         # the number of the table; the bound of the noise decides alone whether it is more
         left = [
-            f"{c.name} keeps {significant(c.judged_rms / (c.noise or outcome.noise))} times its "
+            f"{c.name} keeps {significant(c.steady_rms / (c.noise or outcome.noise))} times its "
             f"noise{_without_own(c)}"
             for c in outcome.after.validation
             if c.over_noise(outcome.noise) > TOLERANCE
@@ -254,8 +254,8 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
 
 
 def _without_own(comparison: Comparison) -> str:
-    own = comparison.rms_without_drift is not None
-    return " without slow noise and drift of its own" if own else ""
+    own = comparison.rms_without_events is not None
+    return " without slow noise, drift and events of its own" if own else ""
 
 
 def _verdict(outcome: DiagnoseOutcome) -> str:

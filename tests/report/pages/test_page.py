@@ -150,15 +150,15 @@ class TestPages:
             assert word in demo.words
 
     def test_figures(self, demo):
-        # training, parameters, three of its residual; four of validation, three of their worst
-        assert demo.seen.count("svg") == 5 + 7
+        # training, parameters, five of its residual; four of validation, five of their worst
+        assert demo.seen.count("svg") == 7 + 9
         assert demo.seen.count("h1") == 1 + 2
 
     def test_the_demo_shows_each_recording_once(self, tmp_path):
         both = identify_outcome(validation=FOUR[:1])
         one = validate_outcome(comparisons=FOUR[:1])
         write_demo_report(both, one, tmp_path / "demo.html")
-        assert check(tmp_path / "demo.html").seen.count("svg") == 5 + 4
+        assert check(tmp_path / "demo.html").seen.count("svg") == 7 + 6
 
     def test_film_page_is_in_kilopascals_and_has_no_thesis_table(self, tmp_path):
         outcome = film_outcome()
@@ -171,7 +171,7 @@ class TestPages:
         assert "e_rms" not in page.words
         assert "Number of branches" in page.words
         assert "not known, so the error cannot be compared with it" in page.words
-        assert page.seen.count("svg") == 3 * 2 + 2 + 2 * 3
+        assert page.seen.count("svg") == 3 * 2 + 2 + 2 * 5
 
     def test_names_are_escaped(self, tmp_path):
         evil = '<script>alert("1")</script>&.h5'
