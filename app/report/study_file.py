@@ -166,7 +166,7 @@ class _Curves:
         return found
 
     def comparison(self, value: Comparison) -> dict[str, Any]:
-        told = self.plain(value, "errors", "published", "ended", "warnings", "origin")
+        told = self.plain(value, "errors", "published", "ended", "warnings", "origin", "channels")
         # not every number is finite, and JSON has only finite ones
         return told | {
             "errors": self.put(np.array([float(x) for x in asdict(value.errors).values()]))

@@ -156,8 +156,11 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 def _content_stamp(path: str) -> str:
     """Return a digest of the file and of its neighbours, whose functions a kernel may contain."""
     digest = hashlib.sha256(Path(path).read_bytes())
-    for neighbour in sorted(Path(path).parent.glob("*.py")):
-        digest.update(neighbour.read_bytes())
+    folder = Path(path).parent
+    # what is generated stands in the cache itself, which is named after all that it contains
+    if folder != cache_folder():
+        for neighbour in sorted(folder.glob("*.py")):
+            digest.update(neighbour.read_bytes())
     return digest.hexdigest()
 
 

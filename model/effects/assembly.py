@@ -13,6 +13,8 @@ effects of the sensor.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import reduce
+from operator import or_
 from types import MappingProxyType
 from typing import Any
 
@@ -56,6 +58,7 @@ _COMBINE = MappingProxyType(
 )
 # The order of effects is that of the signal path; a sensor's lag comes before its nonlinearity.
 _ORDER = ("amplifier", "electrode", "dielectric", "film stress", "inertia", "load", "environment")
+_LAST_BIT = 62  # of a 64-bit number that is not negative
 _SENSOR_ORDER = ("sensor_lag", "sensor_nonlinearity", "drift", "interference", "unknown")
 
 
@@ -67,12 +70,26 @@ def _rank(name: str) -> tuple[int, int, str]:
 
 
 def _bits() -> dict[str, int]:
-    """One bit for each effect; those of the sensor are counted apart from those of the motion."""
+    """One bit for each effect; those of the sensor are counted apart from those of the motion.
+
+    Where there are more effects than bits, the last of the signal path share one: it says that one
+    of them may be active, and which is asked of its coefficients.
+    """
     bits = {}
     for of_sensor in (False, True):
         names = [n for n in sorted(EFFECTS, key=_rank) if PLACES[n].is_sensor == of_sensor]
-        bits.update({name: 1 << i for i, name in enumerate(names)})
+        bits.update({name: 1 << min(i, _LAST_BIT) for i, name in enumerate(names)})
     return bits
+
+
+def _test(name: str) -> str:
+    """Return the condition under which the hooks of an effect are called."""
+    bit = _OF_EFFECT[name]
+    alone = sum(
+        other == bit and PLACES[n].is_sensor == PLACES[name].is_sensor
+        for n, other in _OF_EFFECT.items()
+    )
+    return f"on & {bit}" if alone == 1 else f"on & {bit} and ({_active(name)})"
 
 
 def _has(name: str, hook: str) -> bool:
@@ -89,7 +106,7 @@ def _is_numeric(name: str) -> bool:
 
 
 def _mask(names: Iterable[str]) -> int:
-    return sum(_OF_EFFECT[n] for n in names)
+    return reduce(or_, (_OF_EFFECT[n] for n in names), 0)
 
 
 def _active(name: str) -> str:
@@ -153,7 +170,7 @@ def _text() -> str:
                     function = f"{modules[name]}_stiffness"
                 call = f"{function}(c, {place.at}, m, {place.memory}{taking})"
                 lines += [
-                    f"        if on & {_OF_EFFECT[name]}:",
+                    f"        if {_test(name)}:",
                     f"            {each.format(call)}",
                 ]
         lines.append(f"    return {last}")

@@ -29,7 +29,6 @@ from dearig.model.effects.hooks import HOOKS, Hook
 
 __all__ = [
     "EFFECTS",
-    "EFFECTS_MAX",
     "MEMORY",
     "NEUTRAL",
     "ORIGINS",
@@ -43,10 +42,6 @@ __all__ = [
     "any_hysteretic",
     "hook_faults",
 ]
-
-#: Effects of the motion, and effects of the sensor, that can be told apart: each is one bit of a
-#: 64-bit number that is not negative.
-EFFECTS_MAX = 62
 
 #: What ``ORIGINS`` says of the effects of this folder.
 OURS = "dearig"
@@ -93,9 +88,6 @@ class _Finder:
             return "; ".join(faults)
         if effect.name in self.effects:
             return f"an effect of {self.origins[effect.name]} is called {effect.name!r} already"
-        of_kind = [p for p in self.places.values() if p.is_sensor == hasattr(module, "sense")]
-        if len(of_kind) >= EFFECTS_MAX:
-            return f"there is no place for more than {EFFECTS_MAX} effects of its kind"
         return "; ".join(hook_faults(module))
 
     def add(self, module: ModuleType, source: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dearig.model.control import VoltageLimits
-from dearig.sim_backend.plant import Motion
+from dearig.sim_backend.plant import Electricity, Motion
 from tests.benchmarks.track_peers import (
     FACTORS,
     LEARNED,
@@ -49,7 +49,9 @@ class Linear:
             moved = there + (moved - there) * math.exp(-1.0 / (RATE * LAG))
             rows.append(moved)
         rows = np.array(rows)
-        motion = Motion(rows, *(np.zeros(rows.size) for _ in range(4)))
+        none = np.zeros((2, rows.size - 1))
+        circuit = Electricity(none, none, none, none[0], none, none)
+        motion = Motion(rows, np.zeros(rows.size), circuit, np.zeros(rows.size))
         return motion, replace(self, moved=moved, waiting=tuple(waiting))
 
 

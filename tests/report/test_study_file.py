@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import pytest
 
 from dearig.analysis.study import Residual, Study, StudyRequest, Trace
 from dearig.errors import InputError
+from dearig.model.fitting.channels import ChannelResult
 from dearig.report.study_file import FORMAT, open_study, save_study, studies_in
 from dearig.report.study_view import view_of
 from tests.tools.diagnosis import diagnose_outcome, film_diagnosis, finding, nothing_missing
@@ -119,3 +120,12 @@ def test_missing_and_foreign_curves_are_refused(tmp_path):
     curves.unlink()
     with pytest.raises(InputError, match="cannot be read"):
         open_study(path.parent)
+
+
+def test_a_study_of_recordings_with_electrical_channels_is_saved(tmp_path):
+    outcome = identify_outcome()
+    channel = ChannelResult("current", "A", used=True, noise=1e-6, before=2e-6, after=1e-6)
+    electric = tuple(replace(c, channels=(channel,)) for c in outcome.train)
+    view = view_of(made(tmp_path / "study-1", replace(outcome, train=electric)))
+    again = open_study(save_study(view).parent)
+    assert [one.name for one, _ in again.pairs] == [one.name for one, _ in view.pairs]

@@ -18,6 +18,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dearig.model import kernel
+from dearig.model.compiled.generated import generated_module
 from dearig.model.effects import (
     EFFECTS,
     MEMORY,
@@ -129,6 +130,19 @@ def test_places_do_not_overlap():
         places = [(PLACES[n], e) for n, e in EFFECTS.items()]
         there = [(p, e) for p, e in places if hasattr(p.module, "sense") == of_sensor]
         assert [p.memory + i for p, e in there for i in range(e.memory)] == list(range(size))
+
+
+def test_effects_beyond_the_last_bit_share_it_and_act_alone(monkeypatch):
+    monkeypatch.setattr(assembly, "_LAST_BIT", 3)
+    monkeypatch.setattr(assembly, "_OF_EFFECT", assembly._bits())
+    few = generated_module("dearig.model.effects.assembled_of_four_bits", assembly._text())
+    for name in ("linear drag", "dry friction"):
+        c = with_effect(THESIS, name, numbers(name)).coefficients()
+        at = (np.ones(MEMORY), 1.4, 0.3, 1.39, 1e-3, 0.5)
+        assert assembly.active(c) != few.active(c) == 1 << 3
+        alone = assembly.stress(assembly.active(c), c, *at)
+        assert alone != 0.0
+        assert few.stress(few.active(c), c, *at) == alone
 
 
 @pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if "voltage" in e.drives])
