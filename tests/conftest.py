@@ -3,6 +3,7 @@
 import os
 import signal
 import tempfile
+import threading
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,13 @@ os.environ["DEARIG_LOG_DIR"] = str(Path(tempfile.gettempdir()) / "dearig-tests-l
 settings.register_profile("explore", deadline=None)
 settings.register_profile("repeatable", deadline=None, derandomize=True, database=None)
 settings.load_profile("explore" if os.environ.get("DEARIG_EXPLORE") else "repeatable")
+
+
+def pytest_runtest_setup() -> None:
+    """Let ctrl-C be answered in each test: what an earlier one ran may have it ignored."""
+    on_main = threading.current_thread() is threading.main_thread()
+    if on_main and signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

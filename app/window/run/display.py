@@ -120,6 +120,7 @@ class RunDisplay(QWidget):
         self._running = False
         self.mark_bar.follow(None)
         self.view.end(headline)
+        self.draw()  # all of it: what flowed one block behind the run is at its end now
 
     def forget_run(self) -> None:
         """Stop drawing: the curves of the run are about to be closed."""
