@@ -67,6 +67,8 @@ IN_FILMS = {
     "general hysteresis": {"reach": 0.5},
     "general softening": {"reach": 0.5},
 }
+# ages below the interval of two readings are not told apart
+IN_ACTUATORS = {"general sensor lag": {"age": 1.0 / RATE}}
 # a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
 NEARER = {"mains interference": 1.00005, "vibration": 1.00005, "sensor ripple": 1.05}
 NEARER |= dict.fromkeys(("amplifier limit", "sensor saturation"), 0.8)
@@ -230,7 +232,8 @@ def truth_of(base, names):
     effects = []
     for name in names:
         size = LARGER_IN_FILMS if isinstance(base, Strip) else LARGER.get(name, 1.0)
-        values = numbers(name, size, **(IN_FILMS.get(name, {}) if isinstance(base, Strip) else {}))
+        given = IN_FILMS if isinstance(base, Strip) else IN_ACTUATORS
+        values = numbers(name, size, **given.get(name, {}))
         if "sorption_time" in values:
             values["sorption_time"] = (
                 30.0  # a record of a minute does not show that of a thick film
