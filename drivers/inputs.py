@@ -10,7 +10,10 @@ from dearig.drivers.channels import Channel
 from dearig.drivers.rig_kind import RigOptions
 from dearig.drivers.settings import RigSettings
 
-__all__ = ["Inputs", "ReadsInputs"]
+__all__ = ["BLOCK_S", "Inputs", "ReadsInputs"]
+
+#: s of samples in one read: NI recommends ten reads a second.
+BLOCK_S = 0.1
 
 
 class Inputs(Protocol):

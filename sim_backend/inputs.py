@@ -8,6 +8,7 @@ import numpy as np
 
 from dearig.drivers.channels import Channel
 from dearig.drivers.errors import RigError
+from dearig.drivers.inputs import BLOCK_S
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.card import Converters
 from dearig.sim_backend.clock import Clock
@@ -18,8 +19,6 @@ from dearig.sim_backend.signal_path import CHUNK, SignalPath
 from dearig.sim_backend.streams import Streams
 
 __all__ = ["SimulatedInputs"]
-
-_BLOCK = 0.1  # s of samples in one read, as on a card
 
 
 class SimulatedInputs:
@@ -67,7 +66,7 @@ class SimulatedInputs:
 
     def read(self) -> np.ndarray:
         """Return counts (channels, n) int16 of a tenth of a second."""
-        samples = max(1, round(_BLOCK * self._rate))
+        samples = max(1, round(BLOCK_S * self._rate))
         self._clock.wait(self._started + (self._delivered + samples) / self._rate, self._closed)
         if self._closed.is_set():
             raise RigError("the inputs of the simulated rig are closed")

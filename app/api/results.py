@@ -54,55 +54,15 @@ def _named(comparisons: Sequence[Comparison], name: str, others: Sequence[str]) 
     raise InputError(f"{name!r} cannot be plotted; what can is {', '.join(known)}")
 
 
-def _residual(comparisons: Sequence[Comparison], name: str) -> tuple[np.ndarray, np.ndarray]:
-    for comparison in comparisons:
-        if comparison.name == name:
-            return comparison.time, comparison.measured - comparison.model
-    known = ", ".join(c.name for c in comparisons)
-    raise InputError(f"there is no recording {name!r} in this result; it has {known}")
+class _Reported:
+    """What all results have: the residual on each recording, and a report."""
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class IdentifyResult:
-    """Result of an identification.
-
-    Attributes
-    ----------
-    outcome : IdentifyOutcome
-        All numbers of the fit, in SI units.
-    """
-
-    outcome: IdentifyOutcome
+    outcome: IdentifyOutcome | ValidateOutcome | DiagnoseOutcome
 
     @property
-    def model(self) -> Model:
-        """The fitted model."""
-        return Model.of(self.outcome.model)
-
-    @property
-    def parameters(self) -> Rows[Parameter]:
-        """The parameters in SI units with their 95 % intervals."""
-        return Rows(parameters_of(self.outcome.fit.estimates))
-
-    @property
-    def errors(self) -> Rows[RecordingErrors]:
-        """The errors on every recording, those that were fitted first."""
-        return errors_of((*self.outcome.train, *self.outcome.validation))
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What the operator should know of the recordings and the fit."""
-        return warnings_of(self.outcome)
-
-    @property
-    def covariance(self) -> np.ndarray:
-        """The covariance (f, f) of the fitted parameters in SI units, without intervals (0, 0)."""
-        return self.outcome.fit.covariance
-
-    @property
-    def covariance_names(self) -> tuple[str, ...]:
-        """The names of the parameters that ``covariance`` is of."""
-        return self.outcome.fit.covariance_names
+    def _comparisons(self) -> tuple[Comparison, ...]:
+        """The recordings with the final model, those that were fitted first."""
+        raise NotImplementedError
 
     def residual(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the residual on one recording.
@@ -123,7 +83,78 @@ class IdentifyResult:
         InputError
             If no recording has that name.
         """
-        return _residual((*self.outcome.train, *self.outcome.validation), name)
+        for comparison in self._comparisons:
+            if comparison.name == name:
+                return comparison.time, comparison.measured - comparison.model
+        known = ", ".join(c.name for c in self._comparisons)
+        raise InputError(f"there is no recording {name!r} in this result; it has {known}")
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write the report.
+
+        Parameters
+        ----------
+        path : str or Path
+            The page, which works offline; a file that exists is replaced.
+
+        Returns
+        -------
+        Path
+            The path that was written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        return write_report(self.outcome, path)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IdentifyResult(_Reported):
+    """Result of an identification.
+
+    Attributes
+    ----------
+    outcome : IdentifyOutcome
+        All numbers of the fit, in SI units.
+    """
+
+    outcome: IdentifyOutcome
+
+    @property
+    def _comparisons(self) -> tuple[Comparison, ...]:
+        return (*self.outcome.train, *self.outcome.validation)
+
+    @property
+    def model(self) -> Model:
+        """The fitted model."""
+        return Model.of(self.outcome.model)
+
+    @property
+    def parameters(self) -> Rows[Parameter]:
+        """The parameters in SI units with their 95 % intervals."""
+        return Rows(parameters_of(self.outcome.fit.estimates))
+
+    @property
+    def errors(self) -> Rows[RecordingErrors]:
+        """The errors on every recording, those that were fitted first."""
+        return errors_of(self._comparisons)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the operator should know of the recordings and the fit."""
+        return warnings_of(self.outcome)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """The covariance (f, f) of the fitted parameters in SI units, without intervals (0, 0)."""
+        return self.outcome.fit.covariance
+
+    @property
+    def covariance_names(self) -> tuple[str, ...]:
+        """The names of the parameters that ``covariance`` is of."""
+        return self.outcome.fit.covariance_names
 
     def plot(self, what: str = "overview") -> Figure:
         """Plot the fit.
@@ -156,28 +187,7 @@ class IdentifyResult:
             others.append("branches")
             if what == "branches":
                 return branches_figure(outcome.trials, outcome.kind)
-        every = (*outcome.train, *outcome.validation)
-        return figures.comparison_figure(_named(every, what, others))
-
-    def to_html(self, path: str | Path) -> Path:
-        """Write the report.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
-        return write_report(self.outcome, path)
+        return figures.comparison_figure(_named(self._comparisons, what, others))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the model or all numbers.
@@ -207,7 +217,7 @@ class IdentifyResult:
 
     def _repr_html_(self) -> str:
         outcome = self.outcome
-        every = (*outcome.train, *outcome.validation)
+        every = self._comparisons
         return card(
             f"Identification: {outcome.title}",
             table_html(parameter_table(outcome.fit)),
@@ -218,7 +228,7 @@ class IdentifyResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ValidateResult:
+class ValidateResult(_Reported):
     """Result of a validation.
 
     Attributes
@@ -230,35 +240,18 @@ class ValidateResult:
     outcome: ValidateOutcome
 
     @property
+    def _comparisons(self) -> tuple[Comparison, ...]:
+        return self.outcome.comparisons
+
+    @property
     def errors(self) -> Rows[RecordingErrors]:
         """The errors on every recording; ``role`` is train for one that the model was fitted to."""
-        return errors_of(self.outcome.comparisons)
+        return errors_of(self._comparisons)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the operator should know of the recordings."""
         return warnings_of(self.outcome)
-
-    def residual(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual on one recording.
-
-        Parameters
-        ----------
-        name : str
-            The name of the recording.
-
-        Returns
-        -------
-        time, residual : numpy.ndarray
-            Both (N,), in s and in m or Pa: measured minus model, NaN where a reading must not be
-            used.
-
-        Raises
-        ------
-        InputError
-            If no recording has that name.
-        """
-        return _residual(self.outcome.comparisons, name)
 
     def plot(self, what: str = "") -> Figure:
         """Plot measurement and model.
@@ -279,31 +272,11 @@ class ValidateResult:
         InputError
             If nothing of that name can be plotted.
         """
-        every = self.outcome.comparisons
+        every = self._comparisons
         worst = max(every, key=lambda c: c.errors.rms)
         if what == "residual":
             return residual_figure(worst)
         return figures.comparison_figure(_named(every, what or worst.name, ["residual"]))
-
-    def to_html(self, path: str | Path) -> Path:
-        """Write the report.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
-        return write_report(self.outcome, path)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write all numbers.
@@ -345,7 +318,7 @@ class ValidateResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DiagnoseResult:
+class DiagnoseResult(_Reported):
     """Result of a diagnosis, finished or interrupted.
 
     Attributes
@@ -355,6 +328,10 @@ class DiagnoseResult:
     """
 
     outcome: DiagnoseOutcome
+
+    @property
+    def _comparisons(self) -> tuple[Comparison, ...]:
+        return (*self.outcome.after.train, *self.outcome.after.validation)
 
     @property
     def verdict(self) -> str:
@@ -390,7 +367,7 @@ class DiagnoseResult:
     @property
     def errors(self) -> Rows[RecordingErrors]:
         """The errors of the final model; ``errors_before`` are those of the thesis's model."""
-        return errors_of((*self.outcome.after.train, *self.outcome.after.validation))
+        return errors_of(self._comparisons)
 
     @property
     def errors_before(self) -> Rows[RecordingErrors]:
@@ -418,27 +395,6 @@ class DiagnoseResult:
         """The names of the parameters that ``covariance`` is of."""
         return self.outcome.finding.final.covariance_names
 
-    def residual(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual on one recording.
-
-        Parameters
-        ----------
-        name : str
-            The name of the recording.
-
-        Returns
-        -------
-        time, residual : numpy.ndarray
-            Both (N,), in s and in m or Pa: measured minus model, NaN where a reading must not be
-            used.
-
-        Raises
-        ------
-        InputError
-            If no recording has that name.
-        """
-        return _residual((*self.outcome.after.train, *self.outcome.after.validation), name)
-
     def plot(self, what: str = "errors") -> Figure:
         """Plot errors or a recording before and after.
 
@@ -465,26 +421,6 @@ class DiagnoseResult:
             return bars_figure(pairs, self.outcome.noise, self.outcome.kind)
         chosen = _named([after for _, after in pairs], what, ["errors"])
         return before_after_figure(first[chosen.name], chosen)
-
-    def to_html(self, path: str | Path) -> Path:
-        """Write the report.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
-        return write_report(self.outcome, path)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the model or all numbers.

@@ -158,16 +158,14 @@ def import_(
     )
     for took in done.took:
         print_line(console, f"  {took}")
-    told = {
-        "took": list(done.took),
-        "notes": [with_hints(note) for note in done.notes],
-        "doubts": [with_hints(doubt) for doubt in done.doubts],
-    }
-    for note in told["notes"]:
-        print_line(console, f"Note: {note}")
-    for doubt in told["doubts"]:
-        print_line(console, f"Check this: {doubt}", style="yellow")
-    write_result({**describe(recording), **told}, json)
+    remarks = [with_hints(note) for note in done.notes]
+    questions = [with_hints(doubt) for doubt in done.doubts]
+    for remark in remarks:
+        print_line(console, f"Note: {remark}")
+    for question in questions:
+        print_line(console, f"Check this: {question}", style="yellow")
+    found = {"took": list(done.took), "notes": remarks, "doubts": questions}
+    write_result({**describe(recording), **found}, json)
 
 
 def _rig_file(path: Path | None) -> tuple[RigFile | None, str]:

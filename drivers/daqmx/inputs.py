@@ -14,6 +14,7 @@ from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import clear
 from dearig.drivers.daqmx.tasks import actual_channels, add_inputs, read_counts, time_conversions
 from dearig.drivers.errors import RigError
+from dearig.drivers.inputs import BLOCK_S
 from dearig.drivers.settings import RigSettings
 
 if TYPE_CHECKING:
@@ -21,8 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DaqmxInputs"]
 
-_BLOCK = 0.1  # s of samples in one read; the library's users recommend ten reads a second
-_WAIT = 0.25  # s for them, after which the reader may be told to end
+_WAIT = 0.25  # s for them, after which a read returns, so that the reader can end
 
 
 class DaqmxInputs:
@@ -78,7 +78,7 @@ class DaqmxInputs:
         if self._task is None:
             raise RigError(f"card {self._address.device}: its inputs are closed")
         with self._errors():
-            samples = max(1, round(_BLOCK * self._rate))
+            samples = max(1, round(BLOCK_S * self._rate))
             return read_counts(self._task, len(self._channels), samples, _WAIT)
 
     def close(self) -> None:

@@ -13,11 +13,9 @@ from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS, EffectValues
 from dearig.model.fitting.channels import (
     ChannelMisfit,
-    ChannelResult,
     Channels,
     drops,
     is_electric,
-    results_of,
 )
 from dearig.model.readings.channels import CURRENT, VOLTAGE_MONITOR
 from dearig.model.simulation.actuator import Actuator
@@ -26,6 +24,12 @@ __all__ = ["ChannelEvidence", "ChannelSays", "Denial"]
 
 _TITLES = {VOLTAGE_MONITOR: "voltage monitor", CURRENT: "current"}
 _SHOWN = {"V": (1.0, "V"), "A": (1e6, "uA")}
+
+
+def _shown(value: float, unit: str) -> str:
+    """Return ``value`` in an SI ``unit`` as a person reads it, to three digits."""
+    factor, shown = _SHOWN[unit]
+    return f"{float(f'{factor * value:.3g}'):g} {shown}"
 
 
 class ChannelSays(NamedTuple):
@@ -55,15 +59,16 @@ class Denial:
     @property
     def text(self) -> str:
         """What the channel says, in a sentence."""
-        factor, unit = _SHOWN[self.unit]
-        implied, seen, noise = (
-            f"{factor * v:.3g} {unit}" for v in (self.implied, self.seen, self.noise)
-        )
+        implied, seen, noise = (_shown(v, self.unit) for v in (self.implied, self.seen, self.noise))
         return (
             f"{self.effect} would explain the displacement, but the {_TITLES[self.channel]} denies "
             f"it: it would change by {implied} RMS, and differs from the model without it by "
             f"{seen} (noise {noise})"
         )
+
+
+def _without(model: Actuator, effect: str) -> Actuator:
+    return replace(model, effects=tuple(e for e in model.effects if e[0] != effect))
 
 
 class ChannelEvidence:
@@ -116,9 +121,7 @@ class ChannelEvidence:
         for name, _ in model.effects:
             if not is_electric(name):
                 continue
-            without = self.of(
-                replace(model, effects=tuple(e for e in model.effects if e[0] != name))
-            )
+            without = self.of(_without(model, name))
             for channel, value in here.items():
                 if value - without[channel] > self._settings.alike:
                     return name, channel
@@ -150,7 +153,7 @@ class ChannelEvidence:
     def denial(self, effect: str, model: Actuator) -> Denial | None:
         """Return what a channel says against ``effect`` with its values in ``model``, if any."""
         alone = replace(model, effects=tuple(e for e in model.effects if e[0] == effect))
-        rest = replace(model, effects=tuple(e for e in model.effects if e[0] != effect))
+        rest = _without(model, effect)
         here, without = self.of(model), self.of(rest)
         against = [n for n in here if here[n] - without[n] > self._settings.alike]
         if not against:
@@ -167,21 +170,17 @@ class ChannelEvidence:
             self._channels.units[channel],
         )
 
-    def results(self, before: Actuator, after: Actuator) -> tuple[ChannelResult, ...]:
-        """Return each channel's residual with the models ``before`` and ``after``."""
-        return results_of(self._channels, self._electric(before), self._electric(after))
-
     def says(self, model: Actuator, effect: str) -> tuple[ChannelSays, ...]:
         """Return what each channel says of one ``effect`` of ``model``."""
-        rest = replace(model, effects=tuple(e for e in model.effects if e[0] != effect))
+        rest = _without(model, effect)
         here, without = self.of(model), self.of(rest)
         misfits = [self._channels.misfits(self._electric(m)) for m in (rest, model)]
         said = []
         for name in self._channels.used:
-            factor, unit = _SHOWN[self._channels.units[name]]
+            unit = self._channels.units[name]
             odds = without[name] - here[name]
-            before, after = (f"{factor * m[name].rms:.3g} {unit}" for m in misfits)
-            noise = f"{factor * misfits[1][name].noise:.3g} {unit}"
+            before, after = (_shown(m[name].rms, unit) for m in misfits)
+            noise = _shown(misfits[1][name].noise, unit)
             left = f"without it {before} RMS are left, with it {after} (noise {noise})"
             title = _TITLES[name]
             if odds > self._settings.alike:

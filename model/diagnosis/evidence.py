@@ -25,13 +25,14 @@ from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting.channels import Channels
 from dearig.model.fitting.intervals import correlation_time, has_spectrum_of, is_flat
+from dearig.model.readings.noise import REST_MIN
+from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
 
 __all__ = ["Evidence", "Judge", "family_of"]
 
 #: Twice the logarithm of odds that nothing outweighs: of an effect that a recorded channel denies.
 _DENIED = 1e6
-_REST_MIN = 100  # readings: fewer do not show whether the noise is white
 
 
 def family_of(member: str) -> str:
@@ -49,9 +50,12 @@ def _coloured_rest(baseline: Fit) -> tuple[np.ndarray, ...]:
         part[at_rest(record)]
         for part, record in zip(baseline.by_record(), baseline.problem.records, strict=True)
     ]
-    if min(part.size for part in rest) < _REST_MIN:
+    if min(part.size for part in rest) < REST_MIN:
         return ()
-    averaged = any(getattr(record, "average", 1) > 1 for record in baseline.problem.records)
+    averaged = any(
+        isinstance(record, ActuatorRecord) and record.average > 1
+        for record in baseline.problem.records
+    )
     if not averaged and all(map(is_flat, rest)):
         return ()
     return tuple(rest)

@@ -8,8 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from dearig.model.fitting.intervals import correlation_time
-from dearig.model.fitting.thinning import thinned
-from dearig.model.readings.noise import about_rest, noise_at_rest, rounding, tails_of
+from dearig.model.fitting.thinning import RATE, thinned
+from dearig.model.readings.noise import (
+    REST_MIN,
+    about_rest,
+    noise_at_rest,
+    rounding,
+    tails_of,
+)
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record, counted, interpolated
 from dearig.model.readings.spikes import spikes
 from dearig.model.simulation.actuator import Actuator
@@ -28,8 +34,6 @@ __all__ = [
 #: Of the largest stress: the error to which a model of a rubber is taken to be true.
 FILM_MODEL_ERROR = 5e-3
 
-_RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
-_QUIET_MIN = 100  # samples at rest: fewer give the noise to worse than 1/sqrt(200) = 7 %
 _FILM_SAMPLES = 1500
 _LEVEL = 8  # neighbours on either side, whose mean is the level of a reading: 80 ms at 200 Hz
 _FAR = 0.05  # share of the noise at rest that is called far off
@@ -50,17 +54,17 @@ def prepared(record: Record, model: Actuator | Strip) -> Record:
 def _thinned(record: Record, model: Actuator | Strip) -> Record:
     if isinstance(record, FilmRecord) or isinstance(model, Strip):
         return record.coarse(_FILM_SAMPLES)
-    thin = thinned(record, _RATE, model)
+    thin = thinned(record, RATE, model)
     if thin is record:
         return record
     moving = np.flatnonzero(thin.drive.voltage)
-    if not (moving.size and moving[0] > _QUIET_MIN):
+    if not (moving.size and moving[0] > REST_MIN):
         return thin
     quiet = np.zeros(thin.displacement.size, dtype=bool)
     quiet[: moving[0] - 1] = True
     if thin.valid is not None:
         quiet &= thin.valid
-    if np.count_nonzero(quiet) < _QUIET_MIN:
+    if np.count_nonzero(quiet) < REST_MIN:
         return thin
     # a sensor that averages makes noise that thinning does not average away
     noise = noise_at_rest(thin.time[quiet], thin.displacement[quiet])
@@ -70,7 +74,7 @@ def _thinned(record: Record, model: Actuator | Strip) -> Record:
 def has_line_at_rest(record: Record) -> bool:
     """Whether something periodic is in the readings before the voltage."""
     rest = at_rest(record)
-    if not isinstance(record, ActuatorRecord) or rest.size < _QUIET_MIN:
+    if not isinstance(record, ActuatorRecord) or rest.size < REST_MIN:
         return False
     _, numbers = about_rest(record.time[rest], record.displacement[rest])
     return numbers > 2  # of a straight line
@@ -98,7 +102,7 @@ def without_spikes(record: Record, residual: np.ndarray) -> Record:
     ``residual`` (N,) is measured less model in m. Where the film rings, no smooth curve through the
     readings shows a spike, but the model knows how it rings.
     """
-    if not isinstance(record, ActuatorRecord) or at_rest(record).size < _QUIET_MIN:
+    if not isinstance(record, ActuatorRecord) or at_rest(record).size < REST_MIN:
         return record
     left = interpolated(record.time, residual, record.valid)
     found = spikes(record.time, left, record.drive.voltage**2, record.lead_in)
@@ -123,7 +127,7 @@ def without_tails(record: Record, residual: np.ndarray) -> Record:
         return record
     usable = np.ones(residual.size, dtype=bool) if record.valid is None else record.valid
     rest = at_rest(record)
-    if rest.size < _QUIET_MIN:
+    if rest.size < REST_MIN:
         return record
     still, _ = about_rest(record.time[rest], record.displacement[rest])
     step = rounding(record.displacement[rest])

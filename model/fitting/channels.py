@@ -32,6 +32,7 @@ from dearig.model.errors import ModelError
 from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.slow_noise import Drift, WhitenedProblem
+from dearig.model.fitting.thinning import RATE
 from dearig.model.kernel import OK
 from dearig.model.kinematics import thinning
 from dearig.model.readings.channels import (
@@ -40,6 +41,7 @@ from dearig.model.readings.channels import (
     ChannelRecord,
     ElectricRecord,
 )
+from dearig.model.readings.noise import REST_MIN
 from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator, Drive, at_rest
 
@@ -53,10 +55,8 @@ __all__ = [
     "results_of",
 ]
 
-_RATE = 200.0  # Hz, as displacement is thinned: slower than any amplifier, faster than any lobe
 _SMOOTHING = 0.010  # s, of the imposed stretch: as in the regression
 _FINEST = 2e-4  # s: faster held outputs are taken as lines, late by half a sample, 0.1 ms
-_REST_MIN = 100  # means at rest: fewer give the noise to worse than 7 %
 _KNOWN = 1.0 / 6.0  # of the gain: 3 standard errors below half
 _SCALE = 0.2  # of the gain of a voltage monitor: no amplifier loses as much
 _SHOWS = 25.0  # of chi-square, above that of as many numbers: five standard deviations
@@ -125,7 +125,7 @@ class _Circuit:
         if status != OK:
             raise ModelError("the model has no rest state under its load")
         self.step = float(np.median(np.diff(drive.time)))
-        self.every = max(1, int(1.0 / (_RATE * self.step) + 1e-6))
+        self.every = max(1, int(1.0 / (RATE * self.step) + 1e-6))
         self._held = drive.hold and not record.means and self.step > _FINEST
         stretch = rest + record.displacement / c[LENGTH]
         stretch[: max(record.lead_in, 1)] = rest
@@ -183,7 +183,7 @@ class _Channel:
         self.y = circuit.means(channel.values)
         rest = self.y[: channel.lead_in // circuit.every]
         self.noise = channel.noise / math.sqrt(circuit.every)
-        if rest.size >= _REST_MIN:
+        if rest.size >= REST_MIN:
             # hum and slow noise are not averaged away
             self.noise = max(self.noise, float(np.std(rest)))
         self._gain_error = channel.gain_error
@@ -504,9 +504,7 @@ class JointProblem(WhitenedProblem):
         """Return d(residuals)/dx (N + M, f) over the ``free`` (d,) coordinates."""
         own = None if residuals is None else residuals[: self.measured.size]
         above = super().jacobian(x, free, own, coarse)
-        steps = np.diag(self.layout.differences(x))[free]
-        up = np.minimum(x + steps, self.layout.upper)
-        down = np.maximum(x - steps, self.layout.lower)
+        up, down = self._sides(x, free, self.layout.differences(x))
         below = np.zeros((self._more, above.shape[1]))
         electric = np.array(
             [q.kind == "effect" and is_electric(q.effect) for q in self.layout.quantities]

@@ -16,10 +16,10 @@ from dearig.model.fitting.intervals import (
     is_flat,
     spectrum_distance,
 )
+from dearig.model.readings.noise import REST_MIN
 
 __all__ = ["NoiseTest", "misfit_p", "noise_test"]
 
-_REST_MIN = 100  # readings at rest: fewer tell neither size nor colour of the noise
 _LAGS = 20  # of the Ljung-Box test
 
 
@@ -73,7 +73,7 @@ def noise_test(
     """
     left = residual[np.isfinite(residual)]
     still = np.zeros(0) if rest is None else rest[np.isfinite(rest)]
-    if still.size < _REST_MIN or np.ptp(still) == 0.0:
+    if still.size < REST_MIN or np.ptp(still) == 0.0:
         away, lines = spectrum_distance(left)
         spectrum = float(kolmogorov(away * math.sqrt(lines)))
         return NoiseTest(None, spectrum, _ljung_box(left), _runs(left))
@@ -103,7 +103,7 @@ def misfit_p(residual: np.ndarray, rest: np.ndarray, *, averaged: bool = False) 
     None where too few readings are at rest, or too few are left.
     """
     left, still = residual[np.isfinite(residual)], rest[np.isfinite(rest)]
-    if still.size < _REST_MIN or left.size < _REST_MIN or np.ptp(still) == 0.0:
+    if still.size < REST_MIN or left.size < REST_MIN or np.ptp(still) == 0.0:
         return None
     return noise_test(left, still, averaged=averaged).p
 

@@ -8,7 +8,10 @@ from dearig.model import kernel
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator, reading_of
 
-__all__ = ["thinned"]
+__all__ = ["RATE", "thinned"]
+
+#: Hz, to which a search may thin records: mains and a load's ringing still show.
+RATE = 200.0
 
 _MISFIT_MAX = 0.02  # of a mean's variance: what thinning may add to the misfit of a true model
 _MISFIT_CORRECTED = 1.0  # the same, where the difference is corrected afterwards

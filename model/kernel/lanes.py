@@ -59,6 +59,7 @@ def _carry_plain(
     steps: int,
     trace: np.ndarray,
 ) -> None:
+    # without effects their coefficients and memory are not read
     film_steps(
         0, table, table, rows(table), branches, propagator, rows(y), rows(origin)[0], v0, v1, t,
         0.0, h, steps, steps, trace,

@@ -10,11 +10,21 @@ import numpy as np
 from dearig.model.errors import ModelError
 from dearig.model.simulation.actuator import Drive
 
-__all__ = ["CURRENT", "CURRENT_UNIT", "VOLTAGE_MONITOR", "ChannelRecord", "ElectricRecord"]
+__all__ = [
+    "CURRENT",
+    "CURRENT_UNIT",
+    "GAIN_ERROR",
+    "VOLTAGE_MONITOR",
+    "ChannelRecord",
+    "ElectricRecord",
+]
 
 #: Names of the channels, as results have them.
 VOLTAGE_MONITOR, CURRENT = "voltage_monitor", "current"
 CURRENT_UNIT = "A"
+#: Relative standard uncertainty of a monitor's scale where the rig file states none: 0.1 to 1 % of
+#: full scale is what makers of high-voltage amplifiers specify.
+GAIN_ERROR = 0.01
 
 
 @dataclass(frozen=True)
@@ -33,7 +43,7 @@ class ChannelRecord:
     noise: float = 0.0
     lead_in: int = 0
     skew: float = 0.0
-    gain_error: float = 0.01
+    gain_error: float = GAIN_ERROR
     reason: str = ""
 
     def __post_init__(self) -> None:

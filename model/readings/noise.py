@@ -20,6 +20,7 @@ __all__ = [
     "LEAD_IN",
     "NOISE_MARGIN",
     "READINGS_MIN",
+    "REST_MIN",
     "Tails",
     "about_rest",
     "coarse_noise",
@@ -37,6 +38,9 @@ LEAD_IN, DIFFERENCES = "lead-in", "second differences"
 #: RMS over noise up to which a residual counts as noise. A lead-in of 2 s at 200 Hz gives the noise
 #: to 1/sqrt(2 * 400) = 3.5 %; this is 2.3 of these.
 NOISE_MARGIN = 1.08
+#: Readings at rest: fewer give the noise to worse than 1/sqrt(200) = 7 %, and do not show its
+#: colour.
+REST_MIN = 100
 #: Fewer readings have no second difference to average.
 READINGS_MIN = 4
 _FAST = 0.1  # s: what changes more slowly is no noise of single readings

@@ -17,11 +17,7 @@ from dearig.model.simulation.actuator import Drive
 from dearig.recording.content.rest_noise import MIN_QUIET
 from dearig.recording.reading.recording import Recording
 
-__all__ = ["GAIN_ERROR", "electric_of"]
-
-#: Relative standard uncertainty of a monitor's scale where the rig file states none: 0.1 to 1 % of
-#: full scale is what makers of high-voltage amplifiers specify.
-GAIN_ERROR = 0.01
+__all__ = ["electric_of"]
 
 
 def electric_of(
@@ -50,7 +46,7 @@ def electric_of(
         displacement,
         recording.quiet_samples,
         channels,
-        means=getattr(recording, "average", 1) > 1,
+        means=recording.average > 1,
     )
 
 
@@ -79,9 +75,7 @@ def _channel(
     skew = {c.name: c.skew for c in recording.channels}.get(
         VOLTAGE_MONITOR if name == VOLTAGE_MONITOR else "current_monitor", 0.0
     )
-    return ChannelRecord(
-        name, unit, values, noise, recording.quiet_samples, max(skew, 0.0), GAIN_ERROR
-    )
+    return ChannelRecord(name, unit, values, noise, recording.quiet_samples, max(skew, 0.0))
 
 
 def _is_clipped(values: np.ndarray, command: np.ndarray, noise: float) -> bool:

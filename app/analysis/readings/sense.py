@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.analysis.readings.channels import GAIN_ERROR
 from dearig.analysis.readings.record import Readings
 from dearig.config.modelfile import ModelFile, load_model
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.readings.channels import CURRENT
+from dearig.model.readings.channels import CURRENT, GAIN_ERROR
 from dearig.model.readings.sensing import SHARES, Sensed, sense_displacement
 from dearig.model.simulation.actuator import Actuator
 from dearig.recording.files import check_output, replaced_when_done
@@ -161,6 +160,11 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
+def _um(length: float) -> str:
+    """Return a ``length`` in m as a person reads it, to three digits."""
+    return f"{float(f'{length * 1e6:.3g}'):g} um"
+
+
 def _sentences(
     sensed: Sensed, agreement: Agreement | None, opened: Recording, gain: float, gain_error: float
 ) -> tuple[str, ...]:
@@ -172,7 +176,7 @@ def _sentences(
                 f"No displacement: the readings carry {100.0 * sensed.share:.2g} % of the film's "
                 f"charge. After each step of the output the film charges within microseconds, "
                 f"between two readings. Record with [card] average = {_advised(opened)}: such "
-                f"rows are means, which miss no charge.",
+                f"rows are means, which contain the charging current.",
             )
         return (
             f"No displacement: the noise of the current, {sensed.noise * 1e6:.3g} uA, is too large "
@@ -182,11 +186,16 @@ def _sentences(
     noise, common = _rms(sensed.noise_error[known]), _rms(sensed.gain_error[known])
     least = float(np.min(sensed.standard_error[known]))
     said = [
-        f"The standard error is {agreement.error * 1e6:.3g} um RMS ({least * 1e6:.3g} um at best): "
-        f"{noise * 1e6:.3g} um from the noise of the current and "
-        f"{common * 1e6:.3g} um from the scale of the charge ({100.0 * gain_error:.2g} %), which "
-        f"is common to all rows.",
+        f"The standard error is {_um(agreement.error)} RMS ({_um(least)} at best): {_um(noise)} "
+        f"from the noise of the current and {_um(common)} from the scale of the charge "
+        f"({100.0 * gain_error:.2g} %), which is common to all rows.",
     ]
+    if gain_error == CHARGE_ERROR:
+        said.append(
+            "That uncertainty is of the instruments' scales alone. A monitor that is read at fixed "
+            "moments after each step of the output has another scale: calibrate the gain with a "
+            "laser once."
+        )
     if common > noise:
         said.append(
             "The scale is the larger part: take the gain that the laser of a recording gives for "

@@ -6,7 +6,7 @@
                         output_state_time, output_set_by (run, guardian), output_monitor_V
 /entry/title, start_time, end_time
 /entry/entry_identifier_uuid   identifies the recording, whatever its file is called
-/entry/data             NXdata: time and the physical values, and beside them NAME_counts (int16);
+/entry/data             NXdata: time, the physical values, and their counts as NAME_counts (int16);
                         where rows are means of several conversions, the attributes average and
                         conversion_rate_Hz, and the counts are sums over a row (int32), whose
                         scaling contains the division

@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 _SPAN = 10.0  # s of the traces
 _NOISE_OVER = 1.0  # s over which value and noise are taken
 _SILENT = 1.0  # s without a sample after which no number is shown
-_TOLD = 1.0  # s between two states of the output that are told to the window
+_REPORT_EVERY = 1.0  # s between two states of the output for the window's bar
 _IDLE = "Inputs are read at rest. Nothing is written to an output."
 _NAMES = {
     "voltage_monitor": "Voltage monitor",
@@ -72,7 +72,8 @@ class _Signal:
         # the unit of a declared channel is the operator's own
         shown = _UNITS.get(channel.unit) if channel.name in _NAMES else None
         self.shown = shown or _Shown(1.0, channel.unit, 1.0, channel.unit)
-        self.newest = Newest(max(2, round(_NOISE_OVER * rate)))
+        self._second = max(2, round(_NOISE_OVER * rate))
+        self.newest = Newest(self._second)
         self.trace = Pyramid(round(_SPAN * rate))
         self.at_end = False
 
@@ -84,7 +85,7 @@ class _Signal:
 
     def last(self) -> np.ndarray:
         """Return the values of the newest second in SI units."""
-        return self.newest.last(1 << 62)
+        return self.newest.last(self._second)
 
 
 class LiveInputs(QWidget):
@@ -115,7 +116,7 @@ class LiveInputs(QWidget):
         self.signals: list[_Signal] = []
         self._rate = 0.0
         self._samples = 0
-        self._heard = self._told = 0.0
+        self._last_sample = self._last_report = 0.0
         self._silence = QTimer(self, interval=250)
         self._silence.timeout.connect(self._check_silence)
         self._build()
@@ -218,7 +219,7 @@ class LiveInputs(QWidget):
     def _show_channels(self, number: int, channels: tuple[Channel, ...], rate: float) -> None:
         if number != self._number:
             return
-        self._rate, self._samples, self._heard = rate, 0, self._clock()
+        self._rate, self._samples, self._last_sample = rate, 0, self._clock()
         self.signals = [_Signal(channel, rate) for channel in channels]
         self.plots.show_channels([(s.label, s.shown.unit) for s in self.signals])
         self.area.set_live(live=True)
@@ -241,7 +242,7 @@ class LiveInputs(QWidget):
     def _take(self, number: int, counts: np.ndarray) -> None:
         if number != self._number or not counts.shape[1]:
             return
-        self._heard = self._clock()
+        self._last_sample = self._clock()
         self._samples += counts.shape[1]
         now = self._samples / self._rate
         for place, (signal, row) in enumerate(zip(self.signals, counts, strict=True)):
@@ -253,13 +254,13 @@ class LiveInputs(QWidget):
             self.plots.curves[place].set_points(at / self._rate, trace, thinned=True)
         self.area.roll(max(0.0, now - _SPAN), max(now, _SPAN))
         self.area.data_changed()
-        self._tell_output()
+        self._report_output()
 
-    def _tell_output(self) -> None:
+    def _report_output(self) -> None:
         monitor = next((s for s in self.signals if s.channel.name == "voltage_monitor"), None)
-        if monitor is None or self._heard - self._told < _TOLD:
+        if monitor is None or self._last_sample - self._last_report < _REPORT_EVERY:
             return
-        self._told = self._heard
+        self._last_report = self._last_sample
         volts = float(monitor.last().mean())
         tolerance = self._session.rig_file.limits.zero_tolerance_kV * 1e3
         known = Known.CONFIRMED if abs(volts) <= tolerance else Known.UNKNOWN
@@ -268,7 +269,7 @@ class LiveInputs(QWidget):
     @Slot()
     def _check_silence(self) -> None:
         """Show no number that is not of now."""
-        silent = self._clock() - self._heard
+        silent = self._clock() - self._last_sample
         if self.reading and silent > _SILENT:
             for place in range(len(self.signals)):
                 self._show_texts(place, "—", "—")
