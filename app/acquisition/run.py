@@ -166,10 +166,11 @@ def record(
             try:
                 # conversions go to interlocks and feedback, rows to recording and observers
                 conversion_rate = rig.load(waveform)
-                channels = rig.identify().channels
+                identity = rig.identify()
+                channels = identity.channels
                 rows = RowMeans(rig_file.card.average)
                 rate = conversion_rate / rows.average
-                identity = replace(rig.identify(), channels=row_channels(channels, rows.average))
+                identity = replace(identity, channels=row_channels(channels, rows.average))
                 room.begin(rate)
                 if loop is not None:
                     loop.begin(channels)
