@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from dearig.api.sequences import Sequence as VoltageSequence
 from dearig.errors import InputError
 from dearig.recording.files import check_output
 from dearig.recording.json_file import write_json
-from dearig.report.as_json import diagnosis_json, outcome_json
+from dearig.report.as_json import result_json
 from dearig.report.figures import recordings as figures
 from dearig.report.figures.diagnosis import bars_figure, before_after_figure
 from dearig.report.figures.parameters import branches_figure, parameters_figure
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 __all__ = ["DiagnoseResult", "IdentifyResult", "ValidateResult"]
 
 
-def _save_json(value: dict[str, Any], path: Path, overwrite: bool) -> Path:
+def _save_json(result: _Reported, path: Path, overwrite: bool) -> Path:
     out = check_output(path, overwrite)
-    write_json(value, out)
+    write_json(result_json(result.outcome), out)
     return out
 
 
@@ -209,7 +209,7 @@ class IdentifyResult(_Reported):
         InputError
             If the file exists, cannot be written, or has another ending.
         """
-        return _save(self, outcome_json(self.outcome), Path(path), overwrite)
+        return _save(self, Path(path), overwrite)
 
     def __repr__(self) -> str:
         """Return the summary in sentences."""
@@ -301,7 +301,7 @@ class ValidateResult(_Reported):
         out = Path(path)
         if out.suffix != ".json":
             raise InputError(f"{out}: a validation is saved as numbers, in a file that ends .json")
-        return _save_json(outcome_json(self.outcome), out, overwrite)
+        return _save_json(self, out, overwrite)
 
     def __repr__(self) -> str:
         """Return the summary in sentences."""
@@ -442,7 +442,7 @@ class DiagnoseResult(_Reported):
         InputError
             If the file exists, cannot be written, or has another ending.
         """
-        return _save(self, diagnosis_json(self.outcome), Path(path), overwrite)
+        return _save(self, Path(path), overwrite)
 
     def __repr__(self) -> str:
         """Return the verdict in sentences."""
@@ -465,11 +465,9 @@ class DiagnoseResult(_Reported):
         return card(self.headline, *parts, sentences=[*words.summary(outcome), *self.warnings])
 
 
-def _save(
-    result: IdentifyResult | DiagnoseResult, numbers: dict[str, Any], path: Path, overwrite: bool
-) -> Path:
+def _save(result: IdentifyResult | DiagnoseResult, path: Path, overwrite: bool) -> Path:
     if path.suffix == ".toml":
         return result.model.save(path, overwrite=overwrite)
     if path.suffix == ".json":
-        return _save_json(numbers, path, overwrite)
+        return _save_json(result, path, overwrite)
     raise InputError(f"{path}: end the name in .toml for the model or in .json for all numbers")

@@ -116,7 +116,7 @@ def demo(
     """
     from dearig.cli.demo import run_demo
     from dearig.cli.terminal import diagnosis_tables, identify_table, validate_tables
-    from dearig.report.as_json import diagnosis_json, outcome_json
+    from dearig.report.as_json import result_json
 
     check_files(force, (), json=json)
     with working(json) as (console, progress):
@@ -128,13 +128,13 @@ def demo(
     print_line(console, f"Report: {result.report}")
     print_line(console, f"Diagnosis: {result.diagnosis_report}")
     write_result(
-        {
+        lambda: {
             "format": "dearig-demo/1",
             "report": str(result.report),
-            "identification": outcome_json(result.identified),
-            "validation": outcome_json(result.validated),
+            "identification": result_json(result.identified),
+            "validation": result_json(result.validated),
             "diagnosis_report": str(result.diagnosis_report),
-            "diagnosis": diagnosis_json(result.diagnosed),
+            "diagnosis": result_json(result.diagnosed),
             "seconds": result.seconds,
         },
         json,
@@ -195,7 +195,7 @@ def identify(
     from dearig.cli.terminal import branch_table, identify_table, spring_table
     from dearig.config.modelfile import load_model
     from dearig.config.rigfile import load_rig_file
-    from dearig.report.as_json import outcome_json
+    from dearig.report.as_json import result_json
 
     numbers = _branches(branches)
     given = (*train, *(validate_ or []), rig_file, effects_of)
@@ -231,7 +231,7 @@ def identify(
     print_line(console, f"Model: {out}")
     if report is not None:
         print_line(console, f"Report: {report}")
-    write_result(outcome_json(outcome), json)
+    write_result(lambda: result_json(outcome), json)
 
 
 def _branches(text: str) -> list[int]:
@@ -266,7 +266,7 @@ def validate(
     """Compare a model with recordings: error tables like the thesis's Tables 4 and 5."""
     from dearig.analysis.validate import validate_model
     from dearig.cli.terminal import validate_tables
-    from dearig.report.as_json import outcome_json
+    from dearig.report.as_json import result_json
 
     check_files(force, (model, *paths), *optional(report), json=json)
     with working(json) as (console, progress):
@@ -278,7 +278,7 @@ def validate(
     console.print(validate_tables(outcome))
     if report is not None:
         print_line(console, f"Report: {report}")
-    write_result(outcome_json(outcome), json)
+    write_result(lambda: result_json(outcome), json)
 
 
 @commands.command(cls=ManyToValidate, rich_help_panel=_PANEL)
@@ -311,7 +311,7 @@ def diagnose(
     from dearig.config.rigfile import load_rig_file
     from dearig.config.toml_input import read_text
     from dearig.recording.result_folder import result_folder
-    from dearig.report.as_json import diagnosis_json
+    from dearig.report.as_json import result_json
     from dearig.report.pages.diagnosis import write_diagnosis_report
 
     given, others = train or [], validate_ or []
@@ -354,7 +354,7 @@ def diagnose(
     for label, path in (("Model", model_out), ("Report", report)):
         if path is not None:
             print_line(console, f"{label}: {path}")
-    write_result(diagnosis_json(outcome), json)
+    write_result(lambda: result_json(outcome), json)
     _raise_early_end(outcome)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -173,12 +173,12 @@ def working(
         yield console_for(json), report
 
 
-def write_result(result: dict[str, Any], json: str | None) -> None:
-    """Write ``result`` to where ``--json`` says, if it was given."""
+def write_result(result: dict[str, Any] | Callable[[], dict[str, Any]], json: str | None) -> None:
+    """Write ``result``, or what it returns, to where ``--json`` says, if it was given."""
     if json is not None:
         from dearig.recording.json_file import write_json
 
-        write_json(result, json)
+        write_json(result() if callable(result) else result, json)
 
 
 def announce_compilation() -> None:

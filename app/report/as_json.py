@@ -15,7 +15,7 @@ from dearig.analysis.outcomes import (
 )
 from dearig.model.verdict import is_rejected, smallest_p
 from dearig.report.made import made_now
-from dearig.report.stored import stored
+from dearig.report.stored import Outcome, stored
 from dearig.report.text.laws import effect_named, law_json
 from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
@@ -37,11 +37,22 @@ if TYPE_CHECKING:
     from dearig.model.fitting.channels import ChannelResult
     from dearig.model.residual import Signature
 
-__all__ = ["diagnosis_json", "outcome_json"]
+__all__ = ["diagnosis_json", "outcome_json", "result_json"]
+
+
+def result_json(outcome: Outcome) -> dict[str, Any]:
+    """``outcome`` for ``--json``: its numbers, and the whole of it for a report made again."""
+    from dearig.analysis.outcomes import DiagnoseOutcome
+
+    if isinstance(outcome, DiagnoseOutcome):
+        numbers = diagnosis_json(outcome)
+    else:
+        numbers = outcome_json(outcome)
+    return {**numbers, "report": stored((outcome,), made_now())}
 
 
 def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
-    """``outcome`` for ``--json``: plain values in SI units, or in the unit that a key ends with.
+    """Numbers of ``outcome``: plain values in SI units, or in the unit that a key ends with.
 
     What is not known, not finite, or has no meaning (the thesis's e_rms for a stress) is None.
     """
@@ -58,7 +69,6 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
             **_rejection_json(outcome.comparisons),
             "recordings": [_comparison_json(c) for c in outcome.comparisons],
             "warnings": list(warnings_of(outcome)),
-            "report": stored((outcome,), made_now()),
         }
     fit = outcome.fit
     known = fit.covariance.size > 0
@@ -86,7 +96,6 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "assumed": outcome.assumed,
         "seconds": _number(outcome.seconds),
         "warnings": list(warnings_of(outcome)),
-        "report": stored((outcome,), made_now()),
     }
 
 
@@ -228,7 +237,7 @@ def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:
 
 
 def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
-    """``outcome`` for ``--json`` of diagnose, in the units that the keys end with."""
+    """Numbers of ``outcome``, in the units that the keys end with."""
     # One piece: the document key by key, as the page on JSON lists it.
     from dearig.report.text.diagnosis import signatures_of
 
@@ -350,7 +359,6 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "model_path": outcome.model_path,
         "simulations": int(finding.simulations),
         "seconds": _number(outcome.seconds),
-        "report": stored((outcome,), made_now()),
     }
 
 

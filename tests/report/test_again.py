@@ -20,14 +20,14 @@ from dearig.model.effects import EFFECTS
 from dearig.recording.json_file import write_json
 from dearig.recording.reading.origin import Origin
 from dearig.report.again import read_result, write_again
-from dearig.report.as_json import diagnosis_json, outcome_json
+from dearig.report.as_json import diagnosis_json, outcome_json, result_json
 from dearig.report.made import Made
 from dearig.report.pages.diagnosis import write_diagnosis_report
 from dearig.report.pages.head import head_of
 from dearig.report.pages.html import write_demo_report, write_identify_report
 from dearig.report.pages.laws import law_view
 from dearig.report.pages.seal import check_page
-from dearig.report.stored import _hints, restored, stored
+from dearig.report.stored import Outcome, _hints, restored, stored
 from dearig.report.text import citation
 from tests.tools.command import dearig, done, refused
 from tests.tools.diagnosis import diagnose_outcome, film_diagnosis
@@ -46,10 +46,9 @@ def without_heads(page: Path) -> str:
     return text + rows.partition("<!-- dearig report")[0]
 
 
-def plain(outcome: object) -> dict[str, object]:
+def plain(outcome: Outcome) -> dict[str, object]:
     """All numbers of an outcome, without the outcome itself."""
-    make = diagnosis_json if isinstance(outcome, DiagnoseOutcome) else outcome_json
-    return {k: v for k, v in make(outcome).items() if k != "report"}
+    return {k: v for k, v in result_json(outcome).items() if k != "report"}
 
 
 @pytest.mark.parametrize("kind", ["fit", "diagnosis", "film"])
@@ -75,13 +74,19 @@ def test_a_page_made_again_is_the_page(tmp_path: Path, kind: str) -> None:
     [identify_outcome(), validate_outcome(), diagnose_outcome(), film_diagnosis()],
     ids=["identification", "validation", "diagnosis", "film"],
 )
-def test_a_json_file_holds_every_number_of_its_result(tmp_path: Path, outcome: object) -> None:
-    make = diagnosis_json if isinstance(outcome, DiagnoseOutcome) else outcome_json
+def test_a_json_file_holds_every_number_of_its_result(tmp_path: Path, outcome: Outcome) -> None:
     path = tmp_path / "result.json"
-    write_json(make(outcome), path)
+    write_json(result_json(outcome), path)
     (back,) = read_result(path).outcomes
     assert type(back) is type(outcome)
     assert plain(back) == plain(outcome)
+
+
+def test_numbers_alone_are_not_the_whole_result() -> None:
+    """The window and a study's file keep the outcome in another way, and do not pay for two."""
+    assert "report" not in outcome_json(identify_outcome())
+    assert "report" not in outcome_json(validate_outcome())
+    assert "report" not in diagnosis_json(diagnose_outcome())
 
 
 def test_arrays_and_odd_numbers_come_back_bit_by_bit() -> None:
@@ -223,7 +228,7 @@ def test_figures_for_print(tmp_path: Path) -> None:
 
 
 def test_figures_over_two_columns_have_text_that_is_text(tmp_path: Path) -> None:
-    write_json(outcome_json(identify_outcome()), tmp_path / "r.json")
+    write_json(result_json(identify_outcome()), tmp_path / "r.json")
     out = tmp_path / "out"
     done("figures", tmp_path / "r.json", "--to", "svg", "--columns", "2", "--out", out)
     svg = "{http://www.w3.org/2000/svg}"
@@ -239,7 +244,7 @@ def test_figures_over_two_columns_have_text_that_is_text(tmp_path: Path) -> None
 
 
 def test_the_command_makes_a_report_again(tmp_path: Path) -> None:
-    write_json(outcome_json(identify_outcome()), tmp_path / "r.json")
+    write_json(result_json(identify_outcome()), tmp_path / "r.json")
     done("report", tmp_path / "r.json", "--out", tmp_path / "r.html")
     check_page((tmp_path / "r.html").read_text(encoding="utf-8"), "r.html")
     refused(dearig("report", tmp_path / "r.json", "--out", tmp_path / "r.html"), "exists")
