@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.excitation import Excitation, Tested
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Contribution, Identification
-    from dearig.model.fitting.channels import ChannelResult
+    from dearig.model.fitting.channels import ChannelCurve, ChannelResult
     from dearig.model.readings.measures import Errors
     from dearig.recording.reading.early_end import EarlyEnd
     from dearig.recording.reading.origin import Origin
@@ -82,7 +82,7 @@ class Comparison:
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
     ``step`` is the converter step of ``measured``, 0.0 where it is not known; each reading is the
     mean of ``average`` conversions. ``channels`` are the electrical channels, with what the plain
-    circuit and the model leave of them.
+    circuit and the model leave of them; ``curves`` are those that are used, over time.
     """
 
     name: str
@@ -107,6 +107,7 @@ class Comparison:
     step: float = 0.0
     average: int = 1
     channels: tuple[ChannelResult, ...] = ()
+    curves: tuple[ChannelCurve, ...] = ()
 
     @property
     def is_simulated(self) -> bool:

@@ -46,6 +46,7 @@ from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator, Drive, at_rest
 
 __all__ = [
+    "ChannelCurve",
     "ChannelMisfit",
     "ChannelResult",
     "Channels",
@@ -114,6 +115,32 @@ class ChannelResult:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class ChannelCurve:
+    """Means of one channel of one record at ``time`` (M,) s, and their prediction, in ``unit``.
+
+    ``predicted`` (M,) has the channel's own gain and offset, of the current also the cable; it
+    leaves ``residual`` (M,) of ``measured`` (M,). ``noise`` is that of one mean.
+    """
+
+    name: str
+    unit: str
+    time: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+    noise: float
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Measured less predicted, (M,)."""
+        return self.measured - self.predicted
+
+    @property
+    def rms(self) -> float:
+        """RMS of the residual."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
 class _Circuit:
     """The circuit of one record: what an effect adds to the plain film's readings, in means."""
 
@@ -132,8 +159,9 @@ class _Circuit:
         width = max(_SMOOTHING / self.step, 0.5)
         self._stretch = np.asarray(gaussian_filter1d(stretch, width, mode="nearest"))
         late = 0.5 * self.step if drive.hold and not record.means else 0.0
+        self.time = self.means(drive.time)
         self._thin = Drive(
-            self.means(drive.time) + late, self.means(drive.voltage), hold=False,
+            self.time + late, self.means(drive.voltage), hold=False,
             temperature=drive.temperature, humidity=drive.humidity,
             warmth=None if drive.warmth is None else self.means(drive.warmth),
             moisture=None if drive.moisture is None else self.means(drive.moisture),
@@ -390,6 +418,14 @@ class Channels:
                 noise=math.sqrt(sum(x.noise**2 * x.y.size for x, _ in some) / count),
             )
         return found
+
+    def curves(self, model: Actuator) -> tuple[ChannelCurve, ...]:
+        """Return each channel of each record with what ``model`` predicts of it."""
+        residuals = self._residuals(model.coefficients())
+        return tuple(
+            ChannelCurve(x.name, x.unit, x.circuit.time, x.y, x.y - r[:-1] * x.noise, x.noise)
+            for x, r in zip(self._channels, residuals, strict=True)
+        )
 
     def explicable(self, name: str) -> tuple[float, int]:
         """Return the cost that smooth functions of the voltage leave, and their number.
