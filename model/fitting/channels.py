@@ -168,8 +168,8 @@ class _Circuit:
         )  # fmt: skip
         self._thin_stretch = self.means(self._stretch)
         self._plain_full = self._full(self.c)
-        self._plain_thin = self._thinned(self.c)
         self.plain = self.means(self._plain_full)
+        self._finer = self.plain - self._thinned(self.c)  # what samples show and means do not
         area = thinning(int(c[HELD]), self._thin_stretch) ** 2
         self.area_slope = area * self.plain[loop.SLOPE]
 
@@ -195,7 +195,7 @@ class _Circuit:
         acting = int(active(mine))
         if not acting & loop.ELECTRIC_BITS:
             return self.plain
-        rows = self.plain + self._thinned(mine) - self._plain_thin
+        rows = self._thinned(mine) + self._finer
         if acting & AMPLIFIER and self._held:
             # a lag of the order of a sample: what a reading sees of each step of the output counts
             # (what the current sees of it is free: C_s)
@@ -218,6 +218,11 @@ class _Channel:
         self._row = loop.OUTPUT if channel.name == VOLTAGE_MONITOR else loop.INTO
         # the charging that laws of leakage neglect takes less than a mean: else it was a lag
         self._least = circuit.c[CAPACITANCE] / (circuit.step * circuit.every)
+        free = [np.ones_like(self.y)]
+        if channel.name == CURRENT:
+            free.append(circuit.area_slope)
+        self._free = np.linalg.qr(np.transpose(free) / [np.linalg.norm(x) or 1.0 for x in free])[0]
+        self._left = self._away(self.y / self.noise)
         self.reason = self._assess()
         self.correlation, self.least = 1.0, math.inf
         if not self.reason:
@@ -241,35 +246,35 @@ class _Channel:
 
     def residuals(self, rows: np.ndarray) -> np.ndarray:
         """Return measured less predicted (M + 1,) in noises, the last that of the gain."""
-        predicted = rows[self._row]
-        columns = [predicted, np.ones_like(predicted)]
-        dropped = False
-        if self.name == CURRENT:
-            columns.append(self.circuit.area_slope)
-            dropped = bool(rows[loop.DROP].any())
-            if dropped:
-                columns.append(rows[loop.DROP])
-        left = self.y - predicted
-        found, residual = self._solved(columns, left)
-        if dropped and found[-1] < self._least:
-            _, residual = self._solved(columns[:-1], left - self._least * columns[-1])
+        predicted = self._away(rows[self._row] / self.noise)
+        left, drop = self._left - predicted, rows[loop.DROP]
+        if self.name != CURRENT or not drop.any():
+            return self._solved([predicted], left)[1]
+        dropped = self._away(drop / self.noise)
+        found, residual = self._solved([predicted, dropped], left)
+        if found[-1] < self._least:
+            return self._solved([predicted], left - self._least * dropped)[1]
         return residual
+
+    def _away(self, values: np.ndarray) -> np.ndarray:
+        """Return ``values`` (M,) without what the offset, and of the current the cable, explain."""
+        return np.asarray(values - self._free @ (self._free.T @ values))
 
     def _solved(
         self, columns: Sequence[np.ndarray], left: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the unknowns of ``columns``, and the residual (M + 1,) of ``left`` (M,).
 
-        The first is the gain's deviation from 1, with its prior.
+        The first is the gain's deviation from 1, with its prior. All are in noises, and orthogonal
+        to what is free.
         """
-        matrix = np.zeros((left.size + 1, len(columns)))
-        matrix[:-1] = np.transpose(columns) / self.noise
-        matrix[-1, 0] = 1.0 / self._gain_error
-        target = np.append(left / self.noise, 0.0)
-        scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-        scaled = matrix / scale
-        found = np.linalg.lstsq(scaled.T @ scaled, scaled.T @ target, rcond=1e-12)[0]
-        return found / scale, target - scaled @ found
+        matrix = np.transpose(columns)
+        inside = matrix.T @ matrix
+        inside[0, 0] += self._gain_error**-2
+        scale = np.sqrt(np.maximum(np.diagonal(inside), 1e-300))
+        normal = inside / np.outer(scale, scale)
+        found = np.linalg.lstsq(normal, (matrix.T @ left) / scale, rcond=1e-12)[0] / scale
+        return found, np.append(left - matrix @ found, -found[0] / self._gain_error)
 
     # -- whether it can be used
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from dearig.report.text.numbers import significant
 from dearig.units import SHOWN_CHANNELS
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from dearig.model.fitting.channels import ChannelCurve
@@ -93,20 +95,35 @@ def evidence_figure(
             values = np.array([dict(said).get(name, 0.0) for _, said in evidence])
             places = rows + (i - 0.5 * (len(channels) - 1)) * height
             ax.barh(places, values, height=0.9 * height, color=colour, label=channel_title(name))
-            largest = max(largest, float(np.abs(values).max()))
+            largest = max(largest, float(values.max()))
             for place, value in zip(places, values, strict=True):
                 ax.annotate(
-                    f"{value:+.3g}" if abs(value) < 1e4 else f"{value:+.2g}",
+                    f"{value:+,.0f}",
                     (value, place), (3 if value >= 0.0 else -3, 0), textcoords="offset points",
                     va="center", ha="left" if value >= 0.0 else "right", fontsize=text_size(8.0),
                 )  # fmt: skip
         ax.axvline(0.0, color=base.UNSURE, linewidth=0.8)
-        ax.set_xscale("symlog", linthresh=_LINEAR)
-        low = min((v for _, said in evidence for _, v in said), default=0.0)
-        ax.set_xlim(-20.0 * largest if low < -1.0 else -_LINEAR, 20.0 * largest)
+        least = min((v for _, said in evidence for _, v in said), default=0.0)
+        _evidence_axis(ax, min(least, 0.0), largest)
         ax.set_yticks(rows, [base.drawable(family, _NAME) for family, _ in evidence])
         ax.set_ylim(len(evidence) - 0.5, -0.5)
         ax.grid(visible=False, axis="y")
         ax.set_xlabel("Gain of the criterion over the plain model")
         base.legend(ax, 3)
     return figure
+
+
+def _evidence_axis(ax: Axes, low: float, high: float) -> None:
+    """Make the horizontal axis linear up to 10 and logarithmic beyond, with room for numbers."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    ax.set_xscale("symlog", linthresh=_LINEAR)
+    ends = (-_LINEAR if low > -1.0 else -max(500.0 * -low, 500.0), 200.0 * high)
+    decades = math.log10(max(high, -low) / _LINEAR)
+    step = max(1, math.ceil(decades / 2.0))
+    ticks = [_LINEAR * 10.0 ** (step * i) for i in range(int(decades / step) + 1)]
+    inside = [t for t in (0.0, *ticks, *(-t for t in ticks)) if 1.2 * low <= t <= 1.2 * high]
+    ax.xaxis.set_major_locator(FixedLocator(inside))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
+    ax.set_xlim(*ends)
