@@ -17,7 +17,6 @@ from dearig.model.diagnosis.events import OneTimeEvent
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting import Estimate
 from dearig.report.as_json import diagnosis_json
-from dearig.report.figures.channels import channel_figure, evidence_figure
 from dearig.report.figures.diagnosis import (
     bars_figure,
     before_after_figure,
@@ -83,40 +82,6 @@ def test_no_model_of_a_film_is_asked_to_reach_the_noise():
         assert words in told[0]
     assert summary(diagnose_outcome())[0].endswith("With it, only noise is left.")
     assert "down to the noise, and no other" in summary(nothing_missing())[0]
-
-
-class TestChannels:
-    def test_the_page_has_what_each_channel_leaves_and_says(self, tmp_path):
-        read = check(write_diagnosis_report(electric_outcome(), tmp_path / "report.html"))
-        assert "Voltage monitor and current" in read.words
-        assert "not recorded" in read.words
-        assert "the voltage monitor denies it" in read.words
-        assert "What each channel adds to the criterion" in read.words
-        assert "train.h5: current, means at 200 Hz, with the prediction" in read.words
-
-    def test_a_recording_without_channels_has_no_such_section(self, tmp_path):
-        read = check(write_diagnosis_report(diagnose_outcome(), tmp_path / "report.html"))
-        assert "Voltage monitor and current" not in read.words
-
-    def test_the_terminal_lists_the_channels(self):
-        told = shown(diagnosis_tables(electric_outcome()), width=100)
-        current = re.search(r"current +([\d.]+) +([\d.]+) +([\d.]+) +.A", told)
-        assert current is not None
-        assert float(current[1]) == pytest.approx(2.0 * float(current[2]), rel=0.01)
-
-    def test_bars_have_the_length_of_the_evidence(self):
-        evidence = electric_outcome().finding.channel_evidence
-        (ax,) = evidence_figure(evidence).axes
-        drawn = sorted(patch.get_width() for patch in ax.patches)
-        assert drawn == sorted(odds for _, said in evidence for _, odds in said)
-
-    def test_the_figure_of_a_channel_draws_readings_and_residuals(self):
-        (current,) = (c for c in electric_outcome().before.train[0].curves if c.name == "current")
-        both, left = channel_figure([("model", "#D55E00", current)]).axes
-        assert {line.get_label() for line in both.lines} == {"measured", "model"}
-        assert max(line.get_ydata().max() for line in left.lines if len(line.get_ydata()) > 2) == (
-            pytest.approx(1e6 * current.residual.max())
-        )
 
 
 class TestPage:

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
 
 from dearig.window.session.state import Session
 from dearig.window.study.before_after_plot import BeforeAfterPlot
 from tests.tools.diagnosis import diagnose_outcome, electric_outcome
 
-Keep = Callable[[QWidget], None]
 
-
-def shown(session: Session, keep: Keep, outcome) -> BeforeAfterPlot:
+def shown(session: Session, qtbot: QtBot, outcome) -> BeforeAfterPlot:
     plot = BeforeAfterPlot(session)
-    keep(plot)
+    qtbot.addWidget(plot)
     plot.show_pairs(tuple(zip(outcome.before.train, outcome.after.train, strict=True)))
     return plot
 
@@ -25,9 +21,9 @@ def drawn(plot: BeforeAfterPlot, place: int) -> dict[str, np.ndarray]:
     return {c.title: c.points[1] for c in plot.plots[place].drawn}
 
 
-def test_the_current_is_shown_with_its_predictions_and_residuals(session, keep):
+def test_the_current_is_shown_with_its_predictions_and_residuals(session, qtbot):
     outcome = electric_outcome()
-    plot = shown(session, keep, outcome)
+    plot = shown(session, qtbot, outcome)
     names = [plot.channel.itemText(i) for i in range(plot.channel.count())]
     assert names == ["Displacement", "Voltage monitor", "Current"]
     plot.channel.setCurrentText("Current")
@@ -40,7 +36,7 @@ def test_the_current_is_shown_with_its_predictions_and_residuals(session, keep):
     assert "µm RMS" in plot.error_summary.full_text
 
 
-def test_a_recording_without_channels_has_its_displacement_only(session, keep):
-    plot = shown(session, keep, diagnose_outcome())
+def test_a_recording_without_channels_has_its_displacement_only(session, qtbot):
+    plot = shown(session, qtbot, diagnose_outcome())
     assert not plot.channel.isEnabled()
     assert "µm RMS" in plot.error_summary.full_text
