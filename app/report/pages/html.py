@@ -362,7 +362,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             ("Computing time", (seconds(outcome.seconds),)),
         ),
         film=outcome.kind == "film",
-        rest_length_known=any(not e.free for e in fit.estimates),
+        rest_length_known=any(not (e.free or e.is_fixed) for e in fit.estimates),
     )
 
 
