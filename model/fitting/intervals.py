@@ -136,13 +136,13 @@ def spectrum_distance(
 def natural_ends(q: FreeParameter, low: float, high: float) -> tuple[float, float]:
     """Return the natural ends of an interval of the coordinate of ``q``.
 
-    An open end of a spring's parameter is 0 or infinite, of an effect's the end of its range. A
-    modulus at the lower end of its search range is 0.
+    An open end of a spring's parameter is 0 or infinite, of an effect's the end of its range, and
+    that of a stated range the bound. A modulus at the lower end of its search range is 0.
     """
     if q.logarithmic:
         low, high = math.exp(low), math.exp(high)
-    lowest, highest = q.bounds if q.kind == "effect" else (0.0, math.inf)
-    if q.kind == "mu" and low <= q.bounds[0]:
+    lowest, highest = q.open_ends
+    if q.kind == "mu" and low <= q.search_range[0]:
         low = 0.0
     return max(low, lowest), min(high, highest)
 

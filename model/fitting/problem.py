@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from typing import Self
 
 import numpy as np
 
@@ -50,6 +51,9 @@ class Problem:
     The offset of each record is eliminated in every prediction (``dearig.model.fitting.offsets``)
     unless ``exact_zero``, and so is drift that each of several records has by itself
     (``dearig.model.fitting.drift``); the layout's amplitudes of it then have no influence.
+
+    A prior of the layout is one more reading: its row, the distance from its mean in standard
+    deviations, follows those of the N readings.
     """
 
     def __init__(
@@ -76,6 +80,7 @@ class Problem:
         self.coarse_columns: np.ndarray | None = None
         # difference of full and coarse readings (N,) in m, while the coarse drives are used
         self._correction: np.ndarray | None = None
+        self._with_priors = True
         self.simulations = 0
         #: (N,) as they were taken; ``measured`` are those that are compared
         self.readings = np.concatenate([r.measured for r in records])
@@ -102,8 +107,27 @@ class Problem:
 
     @property
     def samples(self) -> int:
+        """Number of readings and priors that are fitted."""
+        return self.readings_fitted + self._priors
+
+    @property
+    def readings_fitted(self) -> int:
         """Number of readings that are fitted."""
         return int(np.count_nonzero(np.isfinite(self.sigma)))
+
+    @property
+    def _priors(self) -> int:
+        return self.layout.priors.size if self._with_priors else 0
+
+    def _with_prior_rows(self, left: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return residuals ``left`` (P, N), then the priors' (P, k) for ``values`` (P, d)."""
+        return np.hstack([left, self.layout.prior_rows(values)]) if self._priors else left
+
+    def without_priors(self) -> Self:
+        """Return the same problem of the readings alone."""
+        other = copy(self)
+        other._with_priors = False
+        return other
 
     def predict(
         self, values: np.ndarray, coarse: np.ndarray | None = None
@@ -257,13 +281,21 @@ class Problem:
         return record.drive, self.fidelity
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
-        """Return predictions (P, N) over the noise of a population ``values`` (P, d), natural."""
-        return self.predict(values)[0] / self.sigma
+        """Return predictions (P, N + k) over the noise of natural ``values`` (P, d).
+
+        Those of priors are but for a constant.
+        """
+        return self._with_prior_rows(self.predict(values)[0] / self.sigma, values)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
-        """Return (model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
-        predicted, _ = self.predict(self.layout.values(x))
-        return (predicted[0] - self.measured) / self.sigma
+        """Return (model - measured)/noise, (N + k,), at coordinates ``x`` (d,)."""
+        values = np.atleast_2d(self.layout.values(x))
+        predicted, _ = self.predict(values)
+        return self._with_prior_rows((predicted - self.measured) / self.sigma, values)[0]
+
+    def of_readings(self, residuals: np.ndarray) -> np.ndarray:
+        """Return the part (N,) of ``residuals`` that belongs to the readings."""
+        return residuals[: self.measured.size]
 
     def fit_drift(self, x: np.ndarray) -> DriftFit | None:
         """Return the drift of the records at ``x`` (d,); None where no record has its own."""
@@ -295,10 +327,11 @@ class Problem:
         return self.evaluate(x)[0]
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return costs (P,) as in ``costs``, and residuals (P, N), of coordinates (P, d)."""
-        predicted, status = self.predict(self.layout.values(x))
+        """Return costs (P,) as in ``costs``, and residuals (P, N + k), of coordinates (P, d)."""
+        values = self.layout.values(x)
+        predicted, status = self.predict(values)
         still = float(np.sum((self.measured / self.sigma) ** 2)) / self.samples
-        residuals = (predicted - self.measured) / self.sigma
+        residuals = self._with_prior_rows((predicted - self.measured) / self.sigma, values)
         costs = np.sum(residuals**2, axis=1) / self.samples
         return np.where(status == kernel.OK, costs, 10.0 * still + costs), residuals
 
@@ -309,7 +342,23 @@ class Problem:
         residuals: np.ndarray | None = None,
         coarse: bool = False,
     ) -> np.ndarray:
-        """Return d(residuals)/dx (N, f) over the ``free`` (d,) coordinates, as one population.
+        """Return d(residuals)/dx (N + k, f) over the ``free`` (d,) coordinates.
+
+        The derivatives of the readings are one population; priors need no simulation.
+        """
+        own = None if residuals is None else self.of_readings(residuals)
+        above = self._readings_jacobian(x, free, own, coarse)
+        if not self._priors:
+            return above
+        up, down = self._sides(x, free, self.layout.differences(x))
+        width = (up - down).sum(axis=1)
+        high, low = (self.layout.prior_rows(self.layout.values(side)) for side in (up, down))
+        return np.vstack([above, (high - low).T / width])
+
+    def _readings_jacobian(
+        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray | None, coarse: bool
+    ) -> np.ndarray:
+        """Return the derivatives (N, f) of the readings' residuals.
 
         Differences are central: two branches of nearly equal relaxation times have nearly parallel
         columns (to 1e-5), and a one-sided difference blurs the direction in which they differ. With
@@ -324,7 +373,7 @@ class Problem:
         if not moving.all():
             # eliminated parameters have columns of exact zeros
             jac = np.zeros((self.measured.size, moving.size))
-            jac[:, moving] = self.jacobian(x, free & ~self.own, residuals, coarse)
+            jac[:, moving] = self._readings_jacobian(x, free & ~self.own, residuals, coarse)
             return jac
         columns = np.zeros(moving.size, dtype=bool)
         if residuals is not None and coarse and self.coarse_columns is not None:
@@ -360,7 +409,7 @@ class Problem:
         seen = np.zeros(x.size, dtype=bool)
         if not self._has_coarse_drives:
             return seen
-        residuals = self.residuals(x)
+        residuals = self.of_readings(self.residuals(x))
         if self.coarse_residuals(x, residuals) is None:
             return seen  # a large error of the reading is an error of the differences too
         asked = free.copy()
@@ -390,7 +439,7 @@ class Problem:
         other.coarse_columns = None
         # a masked reading needs no correction
         sigma = np.where(np.isfinite(self.sigma), self.sigma, 0.0)
-        other._correction = (residuals - coarse) * sigma
+        other._correction = (self.of_readings(residuals) - coarse) * sigma
         return other
 
     def coarse_residuals(self, x: np.ndarray, residuals: np.ndarray) -> np.ndarray | None:
@@ -401,7 +450,8 @@ class Problem:
         coarse = np.asarray((predicted[0] - self.measured) / self.sigma)
         return (
             coarse
-            if np.sum((coarse - residuals) ** 2) < _COARSE_MISFIT_MAX**2 * self.samples
+            if np.sum((coarse - self.of_readings(residuals)) ** 2)
+            < _COARSE_MISFIT_MAX**2 * self.samples
             else None
         )
 

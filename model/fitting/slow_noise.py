@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from copy import copy
 from itertools import pairwise
 
 import numpy as np
@@ -257,10 +256,14 @@ class WhitenedProblem(Problem):
         return self.noise_drift.whitened(predicted - self._correction) + self._correction
 
     def white(self) -> WhitenedProblem:
-        """Return the same problem under white noise alone."""
-        other = copy(self)
+        """Return the same problem of the readings alone, under white noise alone."""
+        other = self.without_priors()
         other.noise_drift, other.measured = None, other.readings
         return other
+
+    def of_channels(self, residuals: np.ndarray) -> np.ndarray:
+        """Return the part of ``residuals`` that belongs to electrical channels: none here."""
+        return residuals[residuals.size :]
 
     @property
     def edges(self) -> np.ndarray:
