@@ -28,7 +28,8 @@ class LocalFit:
 
     ``jacobian`` (N, f) over the free coordinates is that of the last iteration, at ``x`` or one
     step before. ``to_gain`` is what the quadratic model at ``x`` would still take off chi-square, 0
-    where there is none at ``x``. ``beside`` (N, b) are the columns of other parameters where ``jacobian`` is, as far as they were asked for.
+    where there is none at ``x``. ``beside`` (N, b) are the columns of other parameters where
+    ``jacobian`` is, as far as they were asked for.
     """
 
     x: np.ndarray
