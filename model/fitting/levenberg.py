@@ -11,7 +11,8 @@ from dearig.model.fitting.problem import Problem
 
 __all__ = ["LocalFit", "descend", "gain_that_counts"]
 
-_DAMPINGS = np.array([1e-4, 1e-2, 1.0, 30.0])  # tried at once, relative to the current damping
+# tried at once, relative to the current one: a step ten times too long leaves a narrow valley
+_DAMPINGS = np.array([0.03, 0.3, 3.0, 30.0])
 _DAMPING_MIN, _DAMPING_MAX = 1e-12, 1e8
 _GAIN_MIN = 0.1  # of chi-square: a third of a standard deviation of any parameter
 _GAIN_LEFT = 0.01  # of the gain asked for: the step to so little is not taken
