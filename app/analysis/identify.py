@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dearig.analysis.band import prediction_table, with_bands
 from dearig.analysis.budget import given_values
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.outcomes import (
@@ -19,6 +20,7 @@ from dearig.analysis.outcomes import (
     SpringCandidate,
     budget_table,
     covariance_table,
+    pooled_noise,
     pooled_over_noise,
 )
 from dearig.analysis.readings.compare import compare
@@ -33,7 +35,7 @@ from dearig.analysis.readings.opening import Source, check_named_once
 from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
 from dearig.analysis.readings.room import room_texts
 from dearig.analysis.thesis_runs import PUBLISHED_FIT
-from dearig.config.modelfile import ModelFile
+from dearig.config.modelfile import COVARIANCE, PREDICTION, ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.diagnosis.spring_choice import choose_springs
@@ -129,21 +131,24 @@ def identify_recordings(
             fit = add_intervals(records, fit, progress=progress)
     fit = with_budget(records, fit, given, progress=progress)
     compared = [compare(r, fit.model, "train") for r in fitted]
-    validated = [compare(r, fit.model, "validation") for r in others]
-    seconds = clock() - started
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
+    covariance = covariance_table(fit.covariance_names, fit.covariance)
+    model = ModelFile(name, fit.model, {COVARIANCE: covariance})
+    validated = with_bands([compare(r, fit.model, "validation") for r in others], others, model)
+    seconds = clock() - started
     history = _history(fit, recordings, compared, validated, spring, drive, seconds)
+    model = replace(model, history=history)
     kind = recordings[0].kind
     is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
     return IdentifyOutcome(
         title=name,
         kind=kind,
         method=method,
-        model=ModelFile(name, fit.model, history),
+        model=model,
         fit=fit,
         train=tuple(compared),
-        validation=tuple(validated),
+        validation=with_bands(validated, others, model),
         trials=tuple(trials),
         springs=springs,
         seconds=seconds,
@@ -317,6 +322,7 @@ def _history(
             }
             for e in fit.estimates
         ],
-        "covariance": covariance_table(fit.covariance_names, fit.covariance),
+        COVARIANCE: covariance_table(fit.covariance_names, fit.covariance),
+        PREDICTION: prediction_table(train, validation, pooled_noise(train) or 0.0),
         "uncertainty_budget": budget_table(fit.budget),
     }

@@ -14,7 +14,14 @@ from dearig.report.figures import diagnosis as drawn
 from dearig.report.figures.recordings import comparison_figure
 from dearig.report.figures.residual import residual_panels
 from dearig.report.pages.head import head_of, origins_of
-from dearig.report.pages.html import Picture, fitted_rows, picture, prefixes, write_page
+from dearig.report.pages.html import (
+    Picture,
+    band_caption,
+    fitted_rows,
+    picture,
+    prefixes,
+    write_page,
+)
 from dearig.report.pages.laws import LawView, law_view
 from dearig.report.text.diagnosis import (
     before_after_table,
@@ -324,7 +331,8 @@ def _validation_pictures(
         label = f"{after.name} ({after.row})" if after.row else after.name
         last = f"{significant(after.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
         if not changed:
-            found.append(picture(comparison_figure(after), names, f"{label}: {last}."))
+            caption = f"{label}: {last}.{band_caption(after)}"
+            found.append(picture(comparison_figure(after), names, caption))
             continue
         first = f"{significant(before.errors.rms * shown.error_factor)}"
         found.append(
@@ -333,7 +341,7 @@ def _validation_pictures(
                 names,
                 f"{label}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by both "
                 f"models, and the error before ({first}) and after ({last}); the "
-                f"error axes have different scales.",
+                f"error axes have different scales.{band_caption(before)}{band_caption(after)}",
             )
         )
     return tuple(found)
