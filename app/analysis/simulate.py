@@ -57,6 +57,18 @@ class SimulatedRecord:
         return self.values[SIGNALS[self.kind]]
 
     @property
+    def open_limits(self) -> tuple[str, ...]:
+        """Locking limits that the fit of the model did not determine, by their names."""
+        estimates = self.model.history.get("estimate")
+        tables = estimates if isinstance(estimates, list) else []
+        return tuple(
+            str(e["name"])
+            for e in tables
+            if isinstance(e, dict) and e.get("determined") is False
+            and str(e.get("name", "")).startswith("J_")
+        )  # fmt: skip
+
+    @property
     def columns(self) -> dict[str, np.ndarray]:
         """The values and, where there is one, the band: its ends and its parts, (N,) each."""
         found = dict(self.values)

@@ -178,7 +178,8 @@ class TrackOutcome:
     """A target that was followed: what can be reached, and every run.
 
     ``status`` is ``complete``, ``interrupted`` by the operator, or ``stopped`` by a limit, an
-    instrument or the gate, with the ``reason``. ``noise`` in m is that of a reading, ``within`` in
+    instrument or the gate, with the ``reason``; a complete one has a reason where nothing more was
+    to be learned before all runs were made. ``noise`` in m is that of a reading, ``within`` in
     m the distance from the target that is accepted.
     """
 

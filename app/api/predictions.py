@@ -17,6 +17,7 @@ from dearig.recording.reading.origin import Origin
 from dearig.report.figures.signals import signal_figure
 from dearig.report.text.bands import band_texts
 from dearig.report.text.numbers import seconds, significant
+from dearig.report.text.sentences import pull_in_text
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
@@ -178,10 +179,7 @@ class Prediction:
         ]
         if found.field_max is not None:
             rows.append(("true field", f"up to {significant(found.field_max * 1e-6)} MV/m"))
-            limit = "none: the springs stiffen first"
-            if found.pull_in is not None:
-                limit = f"{significant(found.pull_in * 1e-3)} kV"
-            rows.append(("static pull-in", limit))
+            rows.append(("static pull-in", pull_in_text(found)))
         said = () if self.band is None else band_texts(self.band, found.kind)
         picture = drawing(self.plot(), f"{found.title} over time")
         return card(found.title, facts(rows), picture, sentences=said)

@@ -400,6 +400,7 @@ def simulate(
     from dearig.analysis.simulate import save_prediction, simulate_model
     from dearig.config.rigfile import load_rig_file
     from dearig.report.text.bands import NO_BAND, band_json, band_texts
+    from dearig.report.text.sentences import pull_in_text
 
     check_files(force, (model, drive, rig_file), out, *optional(report), json=json)
     with working(json) as (console, _):
@@ -424,10 +425,11 @@ def simulate(
     elif band:
         print_line(console, NO_BAND)
     if prediction.field_max is not None:
-        limit = "no static pull-in if the springs stiffen as the model's locking limits have it"
-        if prediction.pull_in is not None:
-            limit = f"static pull-in at {prediction.pull_in * 1e-3:.3g} kV"
-        print_line(console, f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; {limit}")
+        print_line(
+            console,
+            f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; static pull-in: "
+            f"{pull_in_text(prediction)}",
+        )
     write_result(
         {
             "format": "dearig-simulation/1",
@@ -436,6 +438,7 @@ def simulate(
             "out": str(written),
             "true_field_max_V_per_m": prediction.field_max,
             "pull_in_voltage_V": prediction.pull_in,
+            "locking_limits_not_determined": list(prediction.open_limits),
             "band": band_json(prediction.band, prediction.kind),
         },
         json,

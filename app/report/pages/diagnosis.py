@@ -38,6 +38,7 @@ from dearig.report.text.diagnosis import (
     warnings,
 )
 from dearig.report.text.estimates import effect_table, estimate_table
+from dearig.report.text.laws import place_text
 from dearig.report.text.numbers import seconds, significant
 from dearig.report.text.sentences import describe_model
 from dearig.report.text.tables import Table
@@ -237,7 +238,7 @@ def _unnamed(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     unnamed = outcome.finding.unnamed
     if unnamed is None:
         return ()
-    said = [f"It acts on the {unnamed.acts_on}."]
+    said = [f"It acts {place_text(unnamed.acts_on)}."]
     if unnamed.signature:
         said.append(_with_full_stop(_capitalised(unnamed.signature)))
     if unnamed.expression:

@@ -104,6 +104,8 @@ def track_summary(outcome: TrackOutcome) -> tuple[str, ...]:
         said.append(f"The film can follow the whole target within {_um(outcome.within)} um.")
     if outcome.status != "complete":
         said.append(f"Not all runs were made ({outcome.status}): {outcome.reason}.")
+    elif outcome.reason:
+        said.append(f"Not all runs were needed: {outcome.reason}.")
     return tuple(readable(sentence) for sentence in said)
 
 
