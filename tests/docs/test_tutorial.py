@@ -44,5 +44,8 @@ def test_the_tutorial_shows_what_its_commands_print(tmp_path: Path) -> None:
         for old, new in zip(
             block.text.splitlines(), renewed(block.text, printed).splitlines(), strict=True
         ):
-            # another processor may fit to other last digits
+            # another processor may fit to other last digits, and to other values of what the data
+            # do not determine, which is in brackets
+            if "(" in old:
+                continue
             assert numbers(old) == pytest.approx(numbers(new), rel=0.05, abs=0.02), old
