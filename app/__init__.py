@@ -9,9 +9,9 @@
     fit.save("model.toml")
 
 ``open``, ``record``, ``identify``, ``validate``, ``simulate``, ``sense``, ``diagnose``,
-``invert``, ``track`` and ``hold`` take objects or paths and return values that a notebook displays
-and that have ``plot``, ``to_html`` and ``save``. Nothing is printed; errors are ``DearigError``,
-each a sentence that says what to do.
+``invert``, ``track``, ``hold``, ``study`` and ``trends`` take objects or paths and return values
+that a notebook displays and that have ``plot``, ``to_html`` and ``save``. Nothing is printed;
+errors are ``DearigError``, each a sentence that says what to do.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from dearig.api.results import DiagnoseResult, IdentifyResult, ValidateResult
     from dearig.api.sensing import SenseResult, sense
     from dearig.api.sequences import Sequence
+    from dearig.api.studies import StudyResult, TrendsResult, study, trends
     from dearig.api.tracking import Inversion, TrackResult, invert, track
     from dearig.errors import (
         DearigError,
@@ -58,7 +59,9 @@ __all__ = [
     "SafetyStop",
     "SenseResult",
     "Sequence",
+    "StudyResult",
     "TrackResult",
+    "TrendsResult",
     "ValidateResult",
     "__version__",
     "diagnose",
@@ -70,7 +73,9 @@ __all__ = [
     "record",
     "sense",
     "simulate",
+    "study",
     "track",
+    "trends",
     "validate",
 ]
 
@@ -84,6 +89,7 @@ _MODULES = {
     "dearig.api.results": ("DiagnoseResult", "IdentifyResult", "ValidateResult"),
     "dearig.api.sensing": ("SenseResult", "sense"),
     "dearig.api.sequences": ("Sequence",),
+    "dearig.api.studies": ("StudyResult", "TrendsResult", "study", "trends"),
     "dearig.api.tracking": ("Inversion", "TrackResult", "invert", "track"),
     "dearig.errors": (
         "DearigError",

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.events import OneTimeEvent
     from dearig.model.diagnosis.excitation import Excitation, Tested
     from dearig.model.diagnosis.results import Diagnosis
-    from dearig.model.fitting import Contribution, Identification
-    from dearig.model.fitting.channels import ChannelResult
+    from dearig.model.fitting import Constraint, Contribution, Estimate, Identification
+    from dearig.model.fitting.channels import ChannelCurve, ChannelResult
     from dearig.model.readings.measures import Errors
     from dearig.recording.reading.early_end import EarlyEnd
     from dearig.recording.reading.origin import Origin
@@ -48,7 +48,9 @@ __all__ = [
     "SpringCandidate",
     "ValidateOutcome",
     "budget_table",
+    "constraint_table",
     "covariance_table",
+    "estimate_table",
     "noise_from",
     "pooled_noise",
     "pooled_over_noise",
@@ -82,7 +84,7 @@ class Comparison:
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
     ``step`` is the converter step of ``measured``, 0.0 where it is not known; each reading is the
     mean of ``average`` conversions. ``channels`` are the electrical channels, with what the plain
-    circuit and the model leave of them.
+    circuit and the model leave of them; ``curves`` are those that are used, over time.
     """
 
     name: str
@@ -107,6 +109,7 @@ class Comparison:
     step: float = 0.0
     average: int = 1
     channels: tuple[ChannelResult, ...] = ()
+    curves: tuple[ChannelCurve, ...] = ()
 
     @property
     def is_simulated(self) -> bool:
@@ -477,6 +480,37 @@ class DiagnoseOutcome:
 
 
 _Fitted = TypeVar("_Fitted", bound=IdentifyOutcome | DiagnoseOutcome)
+
+
+def constraint_table(constraint: Constraint | None) -> dict[str, float] | None:
+    """Return what was stated of a parameter, in SI units; None where nothing was."""
+    if constraint is None:
+        return None
+    found = {key: getattr(constraint, key) for key in ("fixed", "low", "high", "mean", "sd")}
+    return {key: float(value) for key, value in found.items() if value is not None}
+
+
+def estimate_table(estimates: Sequence[Estimate]) -> list[dict[str, Any]]:
+    """Return ``estimates`` in SI units for a model's history; an open end is None."""
+
+    def end(e: Estimate, value: float) -> float | None:
+        return None if e.is_fixed or value == 0.0 or not math.isfinite(value) else value
+
+    return [
+        {
+            "name": e.name,
+            "unit": e.unit,
+            "value": e.value,
+            "low95": end(e, e.low),
+            "high95": end(e, e.high),
+            "determined": e.determined,
+            "at_bound": e.at_bound,
+            "systematic": e.systematic,
+            "note": e.note,
+            "stated": constraint_table(e.constraint),
+        }
+        for e in estimates
+    ]
 
 
 def save_fitted_model(outcome: _Fitted, path: str | Path, overwrite: bool = False) -> _Fitted:

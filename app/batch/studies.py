@@ -14,7 +14,7 @@ from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import Queue
 from dearig.batch.shared_fits import film_task, fit_film, rows_of
 from dearig.batch.table_file import write_csv, write_parquet
-from dearig.config.modelfile import load_model
+from dearig.config.modelfile import ModelFile, load_model, model_toml
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.input_file import parse_json, read_input
@@ -123,8 +123,8 @@ def _listed(path: Path) -> Iterator[Subject]:
             yield Subject(name, path.parent / name)
 
 
-def with_model(options: StudyOptions, model: Path | None) -> StudyOptions:
-    """Return ``options`` with the text of the model file that a validation needs."""
+def with_model(options: StudyOptions, model: Path | ModelFile | None) -> StudyOptions:
+    """Return ``options`` with the text of the model, or its file, that a validation needs."""
     if options.do not in KINDS:
         raise InputError(f"{options.do} is not one of {', '.join(KINDS)}", option="do")
     if (options.do == "validate") != (model is not None):
@@ -141,6 +141,8 @@ def with_model(options: StudyOptions, model: Path | None) -> StudyOptions:
         )
     if model is None:
         return options
+    if isinstance(model, ModelFile):
+        return replace(options, model=model_toml(model.name, model.model, model.history))
     load_model(model)  # refuses what is none
     return replace(options, model=read_text(model, "model file"))
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from dearig.report.figures.style import (
     blank,
     drawable,
     few_ticks,
+    legend,
 )
 from dearig.report.text.trends import number_name
 
@@ -26,10 +28,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["life_figure", "trend_figure"]
+__all__ = ["life_figure", "rows_figure", "trend_figure"]
 
 _FILMS_MAX = 24  # in one figure
 _COLUMNS = 4
+_NAMED_MAX = 8  # films in a legend
 
 
 def trend_figure(trend: Trend) -> Figure:
@@ -60,6 +63,41 @@ def trend_figure(trend: Trend) -> Figure:
             ax.set_visible(False)
         for ax in axes[:count:wide]:
             ax.set_ylabel(drawable(number_name(trend.name), 24))
+    return figure
+
+
+def rows_figure(rows: Sequence[Mapping[str, Any]], number: str) -> Figure:
+    """Draw a number of the ``rows`` of a study, with its 95 % intervals, in the order of the runs.
+
+    Each film has its own colour; runs without the number leave a gap.
+    """
+    films = list(dict.fromkeys(str(row.get("film") or "") for row in rows))
+    with style():
+        figure = blank(1.2 * WIDTH, 2.6)
+        ax = figure.subplots()
+        for i, film in enumerate(films):
+            mine = [
+                (place, row)
+                for place, row in enumerate(rows, 1)
+                if str(row.get("film") or "") == film and isinstance(row.get(number), int | float)
+            ]
+            values = np.array([float(row[number]) for _, row in mine])
+            ends = [
+                [abs(v - float(v if (end := row.get(f"{number}_{side}95")) is None else end))
+                 for v, (_, row) in zip(values, mine, strict=True)]
+                for side in ("low", "high")
+            ]  # fmt: skip
+            ax.errorbar(
+                [place for place, _ in mine], values, ends, fmt=".", elinewidth=0.7,
+                color=f"C{i % 10}", label=drawable(film, 18) if i < _NAMED_MAX else None,
+            )  # fmt: skip
+        ax.set_xlabel("Recording, in the order of their starts")
+        ax.set_ylabel(drawable(number_name(number), 30))
+        ax.ticklabel_format(axis="y", useOffset=False)
+        few_ticks(ax, y=5)
+        ax.xaxis.get_major_locator().set_params(integer=True)  # type: ignore[call-arg]
+        if films != [""]:
+            legend(ax, 4)
     return figure
 
 

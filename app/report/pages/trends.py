@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from dearig.report.text.trends import (
     trends_texts,
 )
 
-__all__ = ["write_trends_report"]
+__all__ = ["origins_of_rows", "write_trends_report"]
 
 _NAMED_MAX = 24  # films that the head names
 _DRAWN = 8  # numbers with figures; all are in the table
@@ -59,7 +59,7 @@ def _contents(trends: Trends, title: str) -> Callable[[], dict[str, Any]]:
         return {
             "title": title,
             "lead": "Trends",
-            "head": head_of(_origins(trends), [("Film", [_films(trends)])]),
+            "head": head_of(origins_of_rows(trends.rows), [("Film", [_films(trends)])]),
             "summary": tuple(trends_texts(trends)),
             "tables": tables,
             "next": proposal_texts(trends),
@@ -70,9 +70,9 @@ def _contents(trends: Trends, title: str) -> Callable[[], dict[str, Any]]:
     return contents
 
 
-def _origins(trends: Trends) -> Iterator[Origin]:
-    """Yield what the table says of each recording."""
-    for row in trends.rows:
+def origins_of_rows(rows: Iterable[Mapping[str, Any]]) -> Iterator[Origin]:
+    """Yield what the ``rows`` of a study's table say of each recording."""
+    for row in rows:
         rig = str(row.get("rig") or "")
         yield Origin(
             name=str(row["recording"]),

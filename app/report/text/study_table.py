@@ -25,7 +25,8 @@ _COLUMNS = (
 
 
 def study_table_json(table: StudyTable) -> dict[str, Any]:
-    """Return the table for ``--json``."""
+    """Return the table for ``--json``; files that are not kept are None."""
+    files = {"table": table.table, "parquet": table.parquet}
     return {
         "format": "dearig-study-table/1",
         "do": table.options.do,
@@ -34,8 +35,7 @@ def study_table_json(table: StudyTable) -> dict[str, Any]:
         "failed": len(table.failed),
         "cached": table.cached,
         "moved": table.moved or None,
-        "table": str(table.table),
-        "parquet": None if table.parquet is None else str(table.parquet),
+        **{k: str(p) if p is not None and p.exists() else None for k, p in files.items()},
         "rows": list(table.rows),
     }
 
