@@ -6,7 +6,16 @@ import re
 from dataclasses import dataclass
 from types import MappingProxyType
 
-__all__ = ["SHOWN", "Shown", "name_and_unit", "parameter_unit", "readable"]
+__all__ = [
+    "SHOWN",
+    "SHOWN_CHANNELS",
+    "Shown",
+    "ShownChannel",
+    "name_and_unit",
+    "parameter_key",
+    "parameter_unit",
+    "readable",
+]
 
 #: Unit at the end of a key, and the unit as it is printed.
 _KEY_UNITS = MappingProxyType({
@@ -64,14 +73,55 @@ SHOWN = MappingProxyType(
 )
 
 
+@dataclass(frozen=True)
+class ShownChannel:
+    """How an electrical channel is shown: factors from SI of readings and of errors, and units."""
+
+    title: str
+    factor: float
+    unit: str
+    error_factor: float
+    error_unit: str
+
+    @property
+    def label(self) -> str:
+        """Axis label of readings."""
+        return f"{self.title} ({self.unit})"
+
+    @property
+    def error_label(self) -> str:
+        """Axis label of a residual."""
+        return f"Residual ({self.error_unit})"
+
+
+#: By the name of the channel, as results have it.
+SHOWN_CHANNELS = MappingProxyType(
+    {
+        "voltage_monitor": ShownChannel("Voltage monitor", 1e-3, "kV", 1.0, "V"),
+        "current": ShownChannel("Current", 1e6, "\N{MICRO SIGN}A", 1e6, "\N{MICRO SIGN}A"),
+    }
+)
+
+
 def parameter_unit(unit: str) -> tuple[float, str]:
     """Return ``(factor, unit)`` in which a parameter of SI ``unit`` is shown."""
     return (1e-3, "kPa") if unit == "Pa" else (1.0, unit)
 
 
+def parameter_key(name: str, unit: str) -> str:
+    """Return a parameter's ``name`` with the unit in which it is shown: ``mu_0_kPa``.
+
+    ``unit`` is its SI unit. That of an effect is ``linear_drag.drag_Pa_s``.
+    """
+    stem = name.replace(": ", ".").replace(" ", "_")
+    _, shown = parameter_unit(unit)
+    ending = shown.replace("/", "_per_").replace("²", "2").replace("³", "3").replace(" ", "_")
+    return f"{stem}_{ending}" if ending else stem
+
+
 def readable(text: str) -> str:
-    """Return ``text`` with um, us and +- written as µm, µs and ±."""
-    text = re.sub(r"(?<=\d) u(?=[ms]\b)", " \N{MICRO SIGN}", text)
+    """Return ``text`` with um, us, uA and +- written as µm, µs, µA and ±."""
+    text = re.sub(r"(?<=\d) u(?=[msA]\b)", " \N{MICRO SIGN}", text)
     return re.sub(r"\+- ?(?=\d)", "\N{PLUS-MINUS SIGN}", text)
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from dearig.drivers.channels import Channel
 from dearig.drivers.rig import Block
 from dearig.model import kernel
+from dearig.model.circuit import loop
+from dearig.model.circuit.loop import circuit_state
 from dearig.model.effects import SENSOR_MEMORY
 from dearig.model.errors import ModelError
 from dearig.model.film.sensor import at_sensor
@@ -92,6 +94,12 @@ class Overlay:
         self._keep = max(2, math.ceil(max(self._lag, 0.0) * rate) + 2)
         self._read = (0.0, 0.0)  # displacement and velocity before the sensor's effects
         self._temperature_rise = _TemperatureRise(rate)
+        into = next((c.skew for c in channels if c.name == "current_monitor"), 0.0)
+        self._reads = (loop.ABOUT if average > 1 else loop.AT, max(into, 0.0))
+        self._circuit = circuit_state()
+        #: current (n,) A that the film draws at the samples of the last block, by the model; NaN
+        #: where that failed. The monitor also reads its offset, the cable, and what it is slow for.
+        self.current = np.empty(0)
         self._failure = ""
 
     @property
@@ -109,6 +117,7 @@ class Overlay:
         if block.start != self._next:
             raise ValueError(f"a block starts at sample {block.start}, not at {self._next}")
         self._next += samples
+        self.current = np.full(samples, np.nan)
         if self._failure or samples == 0:
             return np.full(samples, np.nan)
         first = 0 if block.start == 0 else 1  # the sample before, from which the state goes on
@@ -133,12 +142,38 @@ class Overlay:
             stretch,
             speed,
         )
+        if status == kernel.OK:
+            self._draw(time, voltage, air, stretch, first)
         moved = (stretch - self._rest) * self._length
         out = self._sensed(time[first:], moved[first:], speed[first:] * self._length)
         if status != kernel.OK:
             self._failure = f"{STATUS_WORDS[status]} (at {time[min(reached, time.size - 1)]:.4g} s)"
             out[max(reached - first, 0) :] = np.nan
         return out
+
+    def _draw(
+        self,
+        time: np.ndarray,
+        voltage: np.ndarray,
+        air: np.ndarray,
+        stretch: np.ndarray,
+        first: int,
+    ) -> None:
+        """Compute the current along ``stretch`` (n,) at ``time`` (n,) s.
+
+        After the last sample voltage and film go on as before it: what follows is not known yet.
+        """
+        if time.size < 2:
+            self.current = np.zeros(time.size)
+            return
+        ends = ends_of(voltage, self._holds).copy()
+        if not self._holds:
+            ends[-1] = 2.0 * voltage[-1] - voltage[-2]
+        way, into = self._reads
+        rows = loop.follow(
+            self._coefficients, time, voltage, ends, air, stretch, way, into, self._circuit
+        )
+        self.current = rows[loop.INTO, first:]
 
     def _sensed(self, time: np.ndarray, moved: np.ndarray, speed: np.ndarray) -> np.ndarray:
         known = np.concatenate((self._past, np.stack((time, moved, speed))), axis=1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
 from dearig.recording.reading.recording import Recording
-from dearig.units import SHOWN, parameter_unit
+from dearig.units import SHOWN, parameter_key, parameter_unit
 
 __all__ = [
     "conditions_of",
@@ -40,13 +40,11 @@ def parameters_of(outcome: IdentifyOutcome | DiagnoseOutcome) -> list[dict[str, 
 
 def parameter_of(estimate: Any, before: str = "") -> dict[str, Any]:
     """Return one entry of ``parameters_of``; ``before`` is put before a name without an effect."""
-    factor, unit = parameter_unit(estimate.unit)
-    name = estimate.name.replace(": ", ".").replace(" ", "_")
-    if "." not in name:
-        name = before.replace(" ", "_") + name
-    ending = unit.replace("/", "_per_").replace("²", "2").replace("³", "3").replace(" ", "_")
+    factor, _ = parameter_unit(estimate.unit)
+    is_whole = ": " in estimate.name or "." in estimate.name
+    name = estimate.name if is_whole else before + estimate.name
     return {
-        "name": f"{name}_{ending}" if ending else name,
+        "name": parameter_key(name, estimate.unit),
         "value": _finite(estimate.value * factor),
         "low95": _finite(estimate.low * factor) if estimate.low != 0.0 else None,
         "high95": _finite(estimate.high * factor),

@@ -10,15 +10,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dearig.cli.options import (
+    Bounds,
     Branches,
     Drive,
     DriveChannel,
     EndedEarly,
     EndedEarlyOption,
+    Fixed,
     Force,
     Json,
     ManyToValidate,
     Method,
+    ParameterFile,
+    Priors,
     Recording,
     Report,
     RigFileOption,
@@ -26,6 +30,7 @@ from dearig.cli.options import (
     SpringChoice,
     SpringKind,
     Validation,
+    stated_by,
 )
 from dearig.cli.output import (
     check_files,
@@ -167,6 +172,10 @@ def identify(
             metavar="MODEL.toml", help="Fit the effects of this model too, from its values."
         ),
     ] = None,
+    parameters: ParameterFile = None,
+    fix: Fixed = None,
+    bound: Bounds = None,
+    prior: Priors = None,
     drive: Drive = DriveChannel.command,
     rest_length_mm: Annotated[
         float | None,
@@ -198,8 +207,9 @@ def identify(
     from dearig.report.as_json import result_json
 
     numbers = _branches(branches)
-    given = (*train, *(validate_ or []), rig_file, effects_of)
+    given = (*train, *(validate_ or []), rig_file, effects_of, parameters)
     check_files(force, given, out, *optional(report), json=json)
+    stated = stated_by(parameters, fix, bound, prior)
     with working(json) as (console, progress):
         fitted, others = open_recordings(console, train, validate_ or [], ended_early.value)
         outcome = identify_recordings(
@@ -210,6 +220,7 @@ def identify(
             spring=spring,
             branch_spring=branch_spring or "",
             effects=() if effects_of is None else load_model(effects_of).model.effects,
+            parameters=stated,
             drive=drive.value,
             rest_length_mm=rest_length_mm,
             rig_file=None if rig_file is None else load_rig_file(rig_file),
@@ -290,6 +301,10 @@ def diagnose(
     branches: BaselineBranches = 3,
     spring: BaselineSpring = "gent",
     branch_spring: BranchSpring = None,
+    parameters: ParameterFile = None,
+    fix: Fixed = None,
+    bound: Bounds = None,
+    prior: Priors = None,
     drive: Drive = DriveChannel.command,
     rig_file: RigFileOption = None,
     rig: RigToRecordOn = None,
@@ -321,8 +336,10 @@ def diagnose(
             "shows both"
         )
     check_files(
-        force, (*given, *others, rig_file), *optional(report), *optional(model_out), json=json
-    )
+        force, (*given, *others, rig_file, parameters), *optional(report), *optional(model_out),
+        json=json,
+    )  # fmt: skip
+    stated = stated_by(parameters, fix, bound, prior)
     settings = None if rig_file is None else load_rig_file(rig_file)
     of_branches = branch_spring or ""
     if rig is not None:
@@ -333,14 +350,14 @@ def diagnose(
         if rig is None:
             outcome = diagnose_recordings(
                 fitted, validation=untouched, branches=branches, spring=spring,
-                branch_spring=of_branches, drive=drive.value, rig_file=settings,
+                branch_spring=of_branches, parameters=stated, drive=drive.value, rig_file=settings,
                 thorough=thorough, ended_early=ended_early.value, progress=progress,
             )  # fmt: skip
         else:
             outcome = diagnose_rig(
                 rig, out, experiments=experiments, train=fitted, validation=untouched,
                 branches=branches, spring=spring, branch_spring=of_branches,
-                drive=drive.value, rig_file=settings,
+                parameters=stated, drive=drive.value, rig_file=settings,
                 configuration="" if rig_file is None else read_text(rig_file, "rig file"),
                 seed=seed, thorough=thorough, ended_early=ended_early.value, overwrite=force,
                 progress=progress,

@@ -12,6 +12,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from dearig.printable import printable
+from dearig.report.text.channels import channel_errors, channel_table
 from dearig.report.text.diagnosis import (
     before_after_table,
     experiment_table,
@@ -83,6 +84,7 @@ def identify_table(outcome: IdentifyOutcome) -> RenderableType:
             parameter_table(outcome.fit),
             *_errors("Training", outcome.train, published),
             *_grouped("Validation", outcome.validation),
+            *_channels((*outcome.train, *outcome.validation)),
         ],
         warnings_of(outcome),
     )
@@ -91,7 +93,11 @@ def identify_table(outcome: IdentifyOutcome) -> RenderableType:
 def validate_tables(outcome: ValidateOutcome) -> RenderableType:
     """Return the errors of every recording, with the thesis's Tables 4 and 5 where they apply."""
     return _Fitted(
-        [*validate_summary(outcome), *_grouped("By recording", outcome.comparisons)],
+        [
+            *validate_summary(outcome),
+            *_grouped("By recording", outcome.comparisons),
+            *_channels(outcome.comparisons),
+        ],
         warnings_of(outcome),
     )
 
@@ -159,6 +165,9 @@ def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
             pieces.append(before_after_table(heading, before, after, outcome.kind))
             theirs = f"{heading}, by the thesis's formulas"
             pieces.append(thesis_before_after_table(theirs, before, after, outcome.kind))
+    channels = channel_table(outcome)
+    if channels is not None:
+        pieces.append(channels)
     pieces.append(step_table(outcome))
     if finding.steps:
         pieces.append(effect_table(outcome))
@@ -190,6 +199,11 @@ def _grouped(alone: str, comparisons: tuple[Comparison, ...]) -> list[_Piece]:
     for title, members in by_thesis_table(comparisons, alone):
         pieces += _errors(title, members, None)
     return pieces
+
+
+def _channels(comparisons: tuple[Comparison, ...]) -> list[_Piece]:
+    found = channel_errors("Voltage monitor and current", comparisons)
+    return [] if found is None else [found]
 
 
 def _errors(

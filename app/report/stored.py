@@ -259,12 +259,14 @@ def _hints(kind: type) -> dict[str, Any]:
     from dearig.config import modelfile
     from dearig.model import fitting, residual
     from dearig.model.diagnosis import events, excitation, results
+    from dearig.model.fitting import channels
     from dearig.model.readings import measures
     from dearig.recording.reading import early_end, origin
 
     names: dict[str, Any] = {}
     for module in (
-        band, modelfile, fitting, residual, events, excitation, results, measures, early_end, origin
+        band, modelfile, fitting, channels, residual, events, excitation, results, measures,
+        early_end, origin,
     ):  # fmt: skip
         names |= vars(module)
     return typing.get_type_hints(kind, localns=names)

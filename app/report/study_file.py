@@ -14,6 +14,7 @@ from dearig.analysis.outcomes import Comparison
 from dearig.analysis.study import Residual, Study, StudyRequest, Trace, study
 from dearig.errors import InputError
 from dearig.input_file import parse_json, read_input
+from dearig.model.fitting.channels import ChannelCurve
 from dearig.model.readings.measures import Errors
 from dearig.model.residual import Dependence, MissingStress
 from dearig.progress import Progress, quiet
@@ -166,10 +167,13 @@ class _Curves:
         return found
 
     def comparison(self, value: Comparison) -> dict[str, Any]:
-        told = self.plain(value, "errors", "published", "ended", "warnings", "origin", "channels")
+        told = self.plain(
+            value, "errors", "published", "ended", "warnings", "origin", "channels", "curves"
+        )
         # not every number is finite, and JSON has only finite ones
         return told | {
-            "errors": self.put(np.array([float(x) for x in asdict(value.errors).values()]))
+            "errors": self.put(np.array([float(x) for x in asdict(value.errors).values()])),
+            "curves": [self.plain(curve) for curve in value.curves],
         }
 
     def residual(self, value: Residual) -> dict[str, Any]:
@@ -192,7 +196,10 @@ def _view(folder: Path, words: Mapping[str, Any], arrays: Mapping[str, np.ndarra
     def comparison(told: Mapping[str, Any]) -> Comparison:
         numbers = dict(zip(_MEASURES, arrays[told["errors"]].tolist(), strict=True))
         samples = int(numbers.pop("samples"))
-        parts = {**told, "errors": Errors(**numbers, samples=samples)}
+        curves = tuple(
+            made(ChannelCurve, c, "time", "measured", "predicted") for c in told.get("curves", ())
+        )
+        parts = {**told, "errors": Errors(**numbers, samples=samples), "curves": curves}
         found: Comparison = made(Comparison, parts, "time", "drive", "measured", "model")
         return found
 

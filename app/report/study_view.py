@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
 from dearig.report.as_json import diagnosis_json, outcome_json
 from dearig.report.text import diagnosis, sentences, tables
+from dearig.report.text.channels import channel_errors, channel_table
 from dearig.report.text.estimates import effect_table
 from dearig.report.text.tables import Table
 from dearig.units import readable
@@ -103,6 +104,9 @@ def _diagnosis(outcome: DiagnoseOutcome) -> dict[str, Any]:
     ):
         if before and after:
             pieces.append(diagnosis.before_after_table(heading, before, after, outcome.kind))
+    channels = channel_table(outcome)
+    if channels is not None:
+        pieces.append(channels)
     pieces.append(diagnosis.step_table(outcome))
     if finding.steps:
         pieces.append(effect_table(outcome))
@@ -139,6 +143,9 @@ def _fit(outcome: IdentifyOutcome) -> dict[str, Any]:
             tables.error_table(title, members)
             for title, members in tables.by_thesis_table(outcome.validation, "Validation")
         ]
+    channels = channel_errors("Voltage monitor and current", (*outcome.train, *outcome.validation))
+    if channels is not None:
+        pieces.append(channels)
     return {
         "headline": outcome.title,
         "result": tuple(pieces),

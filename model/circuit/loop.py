@@ -29,6 +29,7 @@ __all__ = [
     "INTO",
     "OUTPUT",
     "SLOPE",
+    "circuit_state",
     "follow",
 ]
 
@@ -57,6 +58,8 @@ _SUPPLY, _POLARISE = _BITS["supply"], _BITS["polarise"]
 _supply, _polarise, _permittivity = assembly.supply, assembly.polarise, assembly.permittivity
 _charge, _conduct, _drop = assembly.charge, assembly.conduct, assembly.drop
 _commit, _breathe, _active = assembly.commit, assembly.breathe, assembly.active
+
+_GOING, _FIRST = 4, 5  # in a state, after U, V, charge and command: whether it began; memories
 
 _LEAST = 1.0  # V: at which the polarisation of a film without a voltage is asked for
 _WIDTH = 0.01  # of an interval, over which an instant at its start is a mean, at least
@@ -107,32 +110,40 @@ def _follow(
     stretch: np.ndarray,
     way: int,
     into: float,
+    state: np.ndarray,
     rows: np.ndarray,
 ) -> None:
     # One piece: the state of the circuit is carried from piece to piece of each interval
     n = time.shape[0]
     acting = _active(c) & ELECTRIC_BITS
-    m = np.zeros(MEMORY)
+    of_film = acting & ~_AMPLIFIER
+    goes_on = state[_GOING] > 0.0
+    m = state[_FIRST:].copy()
     breathes = air.shape[1] == n and acting & _BREATHES != 0
     whole = np.zeros(n)  # s that each row is the mean over
-    u, v = voltage[0], voltage[0]
-    if acting:
-        u, v = _now(acting, c, m, time[0], voltage[0], stretch[0], 0.0)
-    q, last = _charged(acting, c, m, stretch[0], v), voltage[0]
+    u, v, q, last = state[0], state[1], state[2], state[3]
+    if not goes_on:
+        u, v = voltage[0], voltage[0]
+        if acting:
+            u, v = _now(acting, c, m, time[0], voltage[0], stretch[0], 0.0)
+        q, last = _charged(of_film, c, m, stretch[0], v), voltage[0]
     for k in range(n):
-        # after the last sample the film stays as it is
+        if k == n - 1:
+            # what comes next begins with this sample again
+            state[0], state[1], state[2], state[3], state[_GOING] = u, v, q, last, 1.0
+            state[_FIRST:] = m
+        # after the last sample the film goes on as before
         h = time[k + 1] - time[k] if k + 1 < n else time[k] - time[k - 1]
-        lam, rate = stretch[k], 0.0
-        if k + 1 < n:
-            rate = (stretch[k + 1] - lam) / h
+        lam = stretch[k]
+        rate = ((stretch[k + 1] - lam) if k + 1 < n else (lam - stretch[k - 1])) / h
         if breathes:
             _breathe(acting, c, m, air[0, k], air[1, k], h)
         before_u, before_q, command = u, q, voltage[k]
-        if command != last or k == 0:
+        if command != last or (k == 0 and not goes_on):
             u = v = command
             if acting:
                 u, v = _now(acting, c, m, time[k], command, lam, rate)
-            q = _charged(acting, c, m, lam, v)
+            q = _charged(of_film, c, m, lam, v)
         if way != AT and k:
             rows[INTO, k] += q - before_q
             rows[SLOPE, k] += u - before_u
@@ -154,15 +165,15 @@ def _follow(
                 _, u = _supply(
                     acting & _AMPLIFIER, c, m, time[k] + t, start, stop, step, middle, rate
                 )
-                _, v = _supply(
-                    acting & ~_AMPLIFIER, c, m, time[k] + t, start_u, u, step, middle, rate
-                )
-            if acting & _POLARISE:
+                v = u
+                if of_film & _SUPPLY:
+                    _, v = _supply(of_film, c, m, time[k] + t, start_u, u, step, middle, rate)
+            if of_film & _POLARISE:
                 _polarise(acting, c, m, start_v, v, step)
             now = lam + rate * end
             if acting & _COMMITS:
                 _commit(acting & _COMMITS, c, m, now, rate, lam + rate * t, step, time[k] + t)
-            q = _charged(acting, c, m, now, v)
+            q = _charged(of_film, c, m, now, v)
             t = end
             row = k
             if way == AT and piece != 1:
@@ -173,9 +184,9 @@ def _follow(
                 continue
             whole[row] += step
             current, dropped = 0.0, 0.0
-            if acting:
-                current = _conduct(acting, c, m, time[k] + t, v, now)
-                dropped = _drop(acting, c, m, v)
+            if of_film:
+                current = _conduct(of_film, c, m, time[k] + t, v, now)
+                dropped = _drop(of_film, c, m, v)
             rows[OUTPUT, row] += 0.5 * (start_u + u) * step
             rows[FILM, row] += 0.5 * (start_v + v) * step
             rows[INTO, row] += q - start_q + current * step
@@ -196,6 +207,7 @@ def follow(
     stretch: np.ndarray,
     way: int = AFTER,
     into: float = 0.0,
+    state: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return the circuit's rows (5, N) along ``stretch`` (N,): ``OUTPUT``, ``FILM``, ...
 
@@ -204,8 +216,17 @@ def follow(
     to twice that), ``AFTER`` or ``ABOUT``.
     A current at an instant is free of the jump of the voltage at the sample, whose charge flows
     within microseconds where nothing is in series with the film.
+
+    A ``state`` of ``circuit_state`` is that of the last sample afterwards: the samples that follow,
+    with this one before them, go on from there. Their first row is then no whole one.
     """
     rows = np.zeros((5, time.size))
     given = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
-    _follow(c, *given, read_only(np.ascontiguousarray(stretch)), way, into, rows)
+    kept = circuit_state() if state is None else state
+    _follow(c, *given, read_only(np.ascontiguousarray(stretch)), way, into, kept, rows)
     return rows
+
+
+def circuit_state() -> np.ndarray:
+    """Return the state of a circuit that has not begun."""
+    return np.zeros(_FIRST + MEMORY)

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from threading import Lock
 
@@ -46,6 +45,7 @@ from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator, Drive, at_rest
 
 __all__ = [
+    "ChannelCurve",
     "ChannelMisfit",
     "ChannelResult",
     "Channels",
@@ -114,6 +114,32 @@ class ChannelResult:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class ChannelCurve:
+    """Means of one channel of one record at ``time`` (M,) s, and their prediction, in ``unit``.
+
+    ``predicted`` (M,) has the channel's own gain and offset, of the current also the cable; it
+    leaves ``residual`` (M,) of ``measured`` (M,). ``noise`` is that of one mean.
+    """
+
+    name: str
+    unit: str
+    time: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+    noise: float
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Measured less predicted, (M,)."""
+        return self.measured - self.predicted
+
+    @property
+    def rms(self) -> float:
+        """RMS of the residual."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
 class _Circuit:
     """The circuit of one record: what an effect adds to the plain film's readings, in means."""
 
@@ -132,16 +158,17 @@ class _Circuit:
         width = max(_SMOOTHING / self.step, 0.5)
         self._stretch = np.asarray(gaussian_filter1d(stretch, width, mode="nearest"))
         late = 0.5 * self.step if drive.hold and not record.means else 0.0
+        self.time = self.means(drive.time)
         self._thin = Drive(
-            self.means(drive.time) + late, self.means(drive.voltage), hold=False,
+            self.time + late, self.means(drive.voltage), hold=False,
             temperature=drive.temperature, humidity=drive.humidity,
             warmth=None if drive.warmth is None else self.means(drive.warmth),
             moisture=None if drive.moisture is None else self.means(drive.moisture),
         )  # fmt: skip
         self._thin_stretch = self.means(self._stretch)
         self._plain_full = self._full(self.c)
-        self._plain_thin = self._thinned(self.c)
         self.plain = self.means(self._plain_full)
+        self._finer = self.plain - self._thinned(self.c)  # what samples show and means do not
         area = thinning(int(c[HELD]), self._thin_stretch) ** 2
         self.area_slope = area * self.plain[loop.SLOPE]
 
@@ -167,7 +194,7 @@ class _Circuit:
         acting = int(active(mine))
         if not acting & loop.ELECTRIC_BITS:
             return self.plain
-        rows = self.plain + self._thinned(mine) - self._plain_thin
+        rows = self._thinned(mine) + self._finer
         if acting & AMPLIFIER and self._held:
             # a lag of the order of a sample: what a reading sees of each step of the output counts
             # (what the current sees of it is free: C_s)
@@ -190,6 +217,11 @@ class _Channel:
         self._row = loop.OUTPUT if channel.name == VOLTAGE_MONITOR else loop.INTO
         # the charging that laws of leakage neglect takes less than a mean: else it was a lag
         self._least = circuit.c[CAPACITANCE] / (circuit.step * circuit.every)
+        free = [np.ones_like(self.y)]
+        if channel.name == CURRENT:
+            free.append(circuit.area_slope)
+        self._free = np.linalg.qr(np.transpose(free) / [np.linalg.norm(x) or 1.0 for x in free])[0]
+        self._left = self._away(self.y / self.noise)
         self.reason = self._assess()
         self.correlation, self.least = 1.0, math.inf
         if not self.reason:
@@ -213,35 +245,35 @@ class _Channel:
 
     def residuals(self, rows: np.ndarray) -> np.ndarray:
         """Return measured less predicted (M + 1,) in noises, the last that of the gain."""
-        predicted = rows[self._row]
-        columns = [predicted, np.ones_like(predicted)]
-        dropped = False
-        if self.name == CURRENT:
-            columns.append(self.circuit.area_slope)
-            dropped = bool(rows[loop.DROP].any())
-            if dropped:
-                columns.append(rows[loop.DROP])
-        left = self.y - predicted
-        found, residual = self._solved(columns, left)
-        if dropped and found[-1] < self._least:
-            _, residual = self._solved(columns[:-1], left - self._least * columns[-1])
+        predicted = self._away(rows[self._row] / self.noise)
+        left, drop = self._left - predicted, rows[loop.DROP]
+        if self.name != CURRENT or not drop.any():
+            return self._solved([predicted], left)[1]
+        dropped = self._away(drop / self.noise)
+        found, residual = self._solved([predicted, dropped], left)
+        if found[-1] < self._least:
+            return self._solved([predicted], left - self._least * dropped)[1]
         return residual
+
+    def _away(self, values: np.ndarray) -> np.ndarray:
+        """Return ``values`` (M,) without what the offset, and of the current the cable, explain."""
+        return np.asarray(values - self._free @ (self._free.T @ values))
 
     def _solved(
         self, columns: Sequence[np.ndarray], left: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the unknowns of ``columns``, and the residual (M + 1,) of ``left`` (M,).
 
-        The first is the gain's deviation from 1, with its prior.
+        The first is the gain's deviation from 1, with its prior. All are in noises, and orthogonal
+        to what is free.
         """
-        matrix = np.zeros((left.size + 1, len(columns)))
-        matrix[:-1] = np.transpose(columns) / self.noise
-        matrix[-1, 0] = 1.0 / self._gain_error
-        target = np.append(left / self.noise, 0.0)
-        scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-        scaled = matrix / scale
-        found = np.linalg.lstsq(scaled.T @ scaled, scaled.T @ target, rcond=1e-12)[0]
-        return found / scale, target - scaled @ found
+        matrix = np.transpose(columns)
+        inside = matrix.T @ matrix
+        inside[0, 0] += self._gain_error**-2
+        scale = np.sqrt(np.maximum(np.diagonal(inside), 1e-300))
+        normal = inside / np.outer(scale, scale)
+        found = np.linalg.lstsq(normal, (matrix.T @ left) / scale, rcond=1e-12)[0] / scale
+        return found, np.append(left - matrix @ found, -found[0] / self._gain_error)
 
     # -- whether it can be used
 
@@ -391,6 +423,14 @@ class Channels:
             )
         return found
 
+    def curves(self, model: Actuator) -> tuple[ChannelCurve, ...]:
+        """Return each channel of each record with what ``model`` predicts of it."""
+        residuals = self._residuals(model.coefficients())
+        return tuple(
+            ChannelCurve(x.name, x.unit, x.circuit.time, x.y, x.y - r[:-1] * x.noise, x.noise)
+            for x, r in zip(self._channels, residuals, strict=True)
+        )
+
     def explicable(self, name: str) -> tuple[float, int]:
         """Return the cost that smooth functions of the voltage leave, and their number.
 
@@ -461,10 +501,9 @@ class JointProblem(WhitenedProblem):
         """Number of readings that are fitted, those of the channels included."""
         return super().samples + self._more
 
-    @property
-    def readings_fitted(self) -> int:
-        """Number of readings of the displacement that are fitted."""
-        return super().samples
+    def of_channels(self, residuals: np.ndarray) -> np.ndarray:
+        """Return the part (M,) of ``residuals`` that belongs to the channels."""
+        return residuals[residuals.size - self._more :]
 
     def white(self) -> WhitenedProblem:
         """Return the displacement alone, under white noise alone."""
@@ -472,11 +511,10 @@ class JointProblem(WhitenedProblem):
 
     @staticmethod
     def alone(problem: WhitenedProblem) -> WhitenedProblem:
-        """Return ``problem`` without the channels' rows."""
-        if not isinstance(problem, JointProblem):
-            return problem
-        other = copy(problem)
-        other._channels, other._more = None, 0
+        """Return ``problem`` of the readings alone, without the rows of channels and priors."""
+        other = problem.without_priors()
+        if isinstance(other, JointProblem):
+            other._channels, other._more = None, 0
         return other
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
@@ -502,8 +540,7 @@ class JointProblem(WhitenedProblem):
         coarse: bool = False,
     ) -> np.ndarray:
         """Return d(residuals)/dx (N + M, f) over the ``free`` (d,) coordinates."""
-        own = None if residuals is None else residuals[: self.measured.size]
-        above = super().jacobian(x, free, own, coarse)
+        above = super().jacobian(x, free, residuals, coarse)
         up, down = self._sides(x, free, self.layout.differences(x))
         below = np.zeros((self._more, above.shape[1]))
         electric = np.array(
@@ -526,9 +563,5 @@ class JointProblem(WhitenedProblem):
         self, x: np.ndarray, residuals: np.ndarray, free: np.ndarray
     ) -> WhitenedProblem | None:
         """Return the problem under coarse drives, corrected to ``residuals`` at ``x``."""
-        found = super().space_mapped(x, residuals[: self.measured.size], free)
+        found = super().space_mapped(x, residuals, free)
         return found if isinstance(found, WhitenedProblem) else None
-
-    def coarse_residuals(self, x: np.ndarray, residuals: np.ndarray) -> np.ndarray | None:
-        """Return the displacement's residuals (N,) by coarse drives; None if not close."""
-        return super().coarse_residuals(x, residuals[: self.measured.size])

@@ -10,8 +10,9 @@ import pytest
 from dearig.acquisition.overlay import Overlay
 from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block
+from dearig.model.circuit import loop
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from dearig.model.simulation.actuator import Actuator, Drive
+from dearig.model.simulation.actuator import Actuator, Drive, at_rest
 from dearig.model.simulation.excitation import Lobes, Ramp, Sequence, Steps
 
 RATE = 1000.0
@@ -20,8 +21,13 @@ COMMAND = Channel("voltage_command", "V", SCALING)
 MONITOR = Channel("voltage_monitor", "V", SCALING)
 READING = Channel("displacement", "m", SCALING, skew=7e-5, delay=2e-3)
 CHANNELS = (COMMAND, MONITOR, READING)
+CURRENT = Channel("current_monitor", "A", SCALING, skew=2e-5)
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
 DRAG = replace(THESIS, effects=(("linear drag", (("drag", 300.0),)),))
+LEAKY = replace(
+    THESIS, effects=(("leakage", (("loss", 0.02), ("growth", 2.0), ("exponent", 0.75))),)
+)
+SLOW = replace(THESIS, effects=(("electrode resistance", (("resistance", 4e7),)),))
 LATE = replace(THESIS, effects=(("sensor lag", (("time_constant", 0.01),)),))
 
 
@@ -63,6 +69,39 @@ def test_blocks_of_any_length_are_the_whole_record(
     found = stepped(actuator, rows, [c for c in cuts if c < volts.size], drive=drive)
     assert np.max(np.abs(found - whole)) < 3e-8  # m, on 1.6 mm
     assert np.ptp(whole) > 1e-3
+
+
+@pytest.mark.parametrize("average", [1, 5])
+@pytest.mark.parametrize("actuator", [THESIS, LEAKY, SLOW], ids=["plain", "leaky", "slow"])
+def test_the_current_of_blocks_is_that_of_the_whole_record(
+    actuator: Actuator, average: int
+) -> None:
+    rows = counts(driven())
+    into = CURRENT.skew if average == 1 else 0.0
+    n = rows.shape[1]
+    voltage = SCALING.physical(rows[0])
+    drive = Drive(np.arange(n) / RATE, voltage, hold=average == 1)
+    stretch = actuator.simulate(drive).stretch
+    way = loop.AT if average == 1 else loop.ABOUT
+    coefficients = actuator.coefficients()
+    at_rest(coefficients)
+    whole = loop.follow(
+        coefficients, drive.time, voltage, drive.ends, drive.air, stretch, way, into
+    )[loop.INTO]
+    parts, start = [], 0
+    overlay = Overlay(actuator, (*CHANNELS, CURRENT), RATE, average=average)
+    for part in np.split(rows, [1, 2, 3, *range(100, n, 100)], axis=1):
+        overlay.advance(Block(start, np.vstack([part, part[:1]])))
+        parts.append(overlay.current)
+        start += part.shape[1]
+    found = np.concatenate(parts)
+    largest = float(np.abs(whole).max())
+    away = np.abs(found - whole)
+    ends = np.zeros(n, dtype=bool)
+    ends[[0, 1, 2, *range(99, n, 100), n - 1]] = True
+    # what follows the end of a block is taken to go on as before; a step of the voltage does not
+    assert away[~ends].max() < 1e-3 * largest
+    assert np.median(away[ends]) < 1e-2 * largest
 
 
 def test_two_overlays_owe_each_other_nothing() -> None:

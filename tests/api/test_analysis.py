@@ -66,6 +66,20 @@ class TestIdentify:
         with pytest.raises(dearig.InputError, match="overview, parameters, residual, short-thesis"):
             fit.plot("branches")
 
+    def test_parameters_are_stated_by_a_mapping_or_a_file(self, run, tmp_path: Path) -> None:
+        stated = {"mu_0_kPa": {"fixed": 46}, "T_1_s": {"low": 0.1, "high": 0.5}}
+        path = tmp_path / "known.toml"
+        path.write_text("mu_0_kPa.fixed = 46\nT_1_s = {low = 0.1, high = 0.5}\n", encoding="utf-8")
+        for given in (stated, path, str(path)):
+            found = dearig.identify(run, branches=1, intervals=False, parameters=given)
+            assert found.parameters["mu_0"].value == 46e3
+            assert found.parameters["mu_0"].stated == {"fixed": 46e3}
+            assert 0.1 <= found.parameters["T_1"].value <= 0.5
+            assert found.parameters["J_0"].stated is None
+        with pytest.raises(dearig.InputError, match="ends in its unit, mu_0_kPa") as told:
+            dearig.identify(run, parameters={"mu_0": {"fixed": 46}})
+        assert told.value.__notes__ == ["see the argument parameters"]
+
     def test_nothing_to_fit_is_refused(self) -> None:
         with pytest.raises(dearig.InputError, match="no recording is given"):
             dearig.identify([])
@@ -94,7 +108,7 @@ class TestValidate:
         numbers = json.loads(both.save(tmp_path / "v.json").read_text(encoding="utf-8"))
         assert numbers["format"].startswith("dearig-validation/")
         assert both.to_html(tmp_path / "v.html").is_file()
-        with pytest.raises(dearig.InputError, match=r"ends \.json"):
+        with pytest.raises(dearig.InputError, match=r"in \.json for all numbers"):
             both.save(tmp_path / "v.toml")
 
     def test_what_is_no_model_is_refused(self, run) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +12,15 @@ import pytest
 
 from dearig.analysis.study import Residual, Study, StudyRequest, Trace
 from dearig.errors import InputError
-from dearig.model.fitting.channels import ChannelResult
 from dearig.report.study_file import FORMAT, open_study, save_study, studies_in
 from dearig.report.study_view import view_of
-from tests.tools.diagnosis import diagnose_outcome, film_diagnosis, finding, nothing_missing
+from tests.tools.diagnosis import (
+    diagnose_outcome,
+    electric_outcome,
+    film_diagnosis,
+    finding,
+    nothing_missing,
+)
 from tests.tools.reports import identify_outcome
 
 TASK = StudyRequest(diagnose=True, train=(Path("train.h5"),), validation=())
@@ -123,9 +128,8 @@ def test_missing_and_foreign_curves_are_refused(tmp_path):
 
 
 def test_a_study_of_recordings_with_electrical_channels_is_saved(tmp_path):
-    outcome = identify_outcome()
-    channel = ChannelResult("current", "A", used=True, noise=1e-6, before=2e-6, after=1e-6)
-    electric = tuple(replace(c, channels=(channel,)) for c in outcome.train)
-    view = view_of(made(tmp_path / "study-1", replace(outcome, train=electric)))
+    view = view_of(made(tmp_path / "study-1", electric_outcome()))
     again = open_study(save_study(view).parent)
-    assert [one.name for one, _ in again.pairs] == [one.name for one, _ in view.pairs]
+    assert [len(one.curves) for one, _ in again.pairs] == [2, 2, 2]
+    for pair, copy in zip(view.pairs, again.pairs, strict=True):
+        assert all(same(one.curves, other.curves) for one, other in zip(pair, copy, strict=True))

@@ -8,6 +8,7 @@ import numpy as np
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, Evaluation, SeparatingExperiment
 from dearig.config.modelfile import ModelFile
+from dearig.model.diagnosis.channels import Denial
 from dearig.model.diagnosis.results import (
     Candidate,
     Diagnosis,
@@ -17,11 +18,18 @@ from dearig.model.diagnosis.results import (
 )
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.fitting import Estimate
+from dearig.model.fitting.channels import ChannelResult
 from dearig.model.readings.measures import errors
 from dearig.model.residual import Dependence, MissingStress, Signature, Unnamed
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
-from tests.tools.reports import ESTIMATES, NOISE, actuator_comparison, film_comparison
+from tests.tools.reports import (
+    ESTIMATES,
+    NOISE,
+    actuator_comparison,
+    film_comparison,
+    with_channels,
+)
 
 LAG = (("sensor lag", (("time_constant", 9.5e-3),)),)
 BASE = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
@@ -181,6 +189,39 @@ def diagnose_outcome(**changes) -> DiagnoseOutcome:
         seconds=12.3,
     )
     return replace(outcome, **changes)
+
+
+def _odds(*values: float) -> tuple[tuple[str, float], ...]:
+    return tuple(zip(("displacement", "voltage_monitor", "current"), values, strict=True))
+
+
+def electric_outcome() -> DiagnoseOutcome:
+    """A diagnosis whose recordings have a voltage monitor and a current."""
+    outcome = diagnose_outcome()
+    before, after = (
+        replace(
+            stand,
+            train=tuple(with_channels(c, leak) for c in stand.train),
+            validation=tuple(with_channels(c, leak) for c in stand.validation),
+        )
+        for stand, leak in ((outcome.before, 30e-6), (outcome.after, 0.0))
+    )
+    left = ChannelResult("voltage_monitor", "V", used=False, reason="not recorded")
+    return replace(
+        outcome,
+        stands=(before, after),
+        finding=finding(
+            channels=(*after.train[0].channels[1:], left),
+            channel_evidence=(
+                ("leakage", _odds(840.0, -2.0, 46e3)),
+                ("amplifier", _odds(851.0, -9e5, 12.0)),
+                ("permittivity", _odds(846.0, 0.0, -5.0)),
+            ),
+            denials=(
+                Denial("amplifier lag", "amplifier", "voltage_monitor", 177.0, 1.0, 1.0, "V"),
+            ),
+        ),
+    )  # fmt: skip
 
 
 def nothing_missing() -> DiagnoseOutcome:

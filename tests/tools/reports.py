@@ -17,6 +17,7 @@ from dearig.analysis.outcomes import (
 from dearig.config.modelfile import ModelFile
 from dearig.model.film.material import TABLE_3, THESIS_FILM, Load, Network
 from dearig.model.fitting import Estimate, Identification
+from dearig.model.fitting.channels import ChannelCurve, ChannelResult
 from dearig.model.readings.measures import errors
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.excitation import Sequence
@@ -42,6 +43,22 @@ def actuator_comparison(
             "noise": NOISE, **changes,
         }
     )  # fmt: skip
+
+
+def with_channels(comparison: Comparison, leak: float = 0.0, seed: int = 5) -> Comparison:
+    """The same recording with a monitor, and a current of which ``leak`` A is not predicted."""
+    rng = np.random.default_rng(seed)
+    share = comparison.drive / 8e3
+    predicted = {"voltage_monitor": comparison.drive, "current": 5e-6 * np.gradient(share)}
+    missed = {"voltage_monitor": 0.0 * share, "current": leak * share**3}
+    curves = []
+    for name, unit, noise in (("voltage_monitor", "V", 1.0), ("current", "A", 2e-6)):
+        measured = predicted[name] + missed[name] + noise * rng.standard_normal(share.size)
+        curves.append(ChannelCurve(name, unit, comparison.time, measured, predicted[name], noise))
+    channels = tuple(
+        ChannelResult(c.name, c.unit, True, c.noise, 2.0 * c.rms, c.rms) for c in curves
+    )
+    return replace(comparison, channels=channels, curves=tuple(curves))
 
 
 def film_comparison(name: str = "cycle.h5", role: str = "train", **changes) -> Comparison:

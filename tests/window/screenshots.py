@@ -26,7 +26,7 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.follow.page import FollowPage
-from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.kit.theme import DARK, LIGHT, apply, prepare_plots
 from dearig.window.recordings.page import RecordingsPage
 from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
@@ -333,7 +333,9 @@ def main() -> None:
             if not name.startswith(asked.only):
                 continue
             for look in LOOKS:
-                window.set_colour_scheme(look)
+                theme = {"light": LIGHT, "dark": DARK}[look]
+                apply(application, theme)
+                session.set_theme(theme)
                 for width, height in SIZES if asked.out else SIZES[:1]:
                     window.resize(width, height)
                     settled()

@@ -28,7 +28,7 @@ from dearig.recording.reading.recording import Recording
 
 if TYPE_CHECKING:
     # imports SciPy, which a comparison of films does without
-    from dearig.model.fitting.channels import ChannelResult
+    from dearig.model.fitting.channels import ChannelCurve, ChannelResult
 
 __all__ = ["compare"]
 
@@ -70,6 +70,7 @@ def compare(
     usable = ~predicted.spiky if look.valid is None else look.valid & ~predicted.spiky
     noise, ended = readings.noise, early_end(recording)
     warnings = [*look.findings, *predicted.warnings, *([ended.sentence] if ended else [])]
+    channels, curves = _channels(readings, model)
     return Comparison(
         name=recording.name,
         kind=recording.kind,
@@ -90,18 +91,21 @@ def compare(
         origin=origin_of(recording, hashed),
         step=_converter_step(recording),
         average=recording.average,
-        channels=_channels(readings, model),
+        channels=channels,
+        curves=curves,
     )
 
 
-def _channels(readings: Readings, model: Actuator | Strip) -> tuple[ChannelResult, ...]:
+def _channels(
+    readings: Readings, model: Actuator | Strip
+) -> tuple[tuple[ChannelResult, ...], tuple[ChannelCurve, ...]]:
     """Return what ``model`` leaves of the voltage monitor and the current of ``readings``."""
     if not isinstance(model, Actuator) or readings.electric is None:
-        return ()
+        return (), ()
     from dearig.model.fitting.channels import Channels, results_of
 
     channels = Channels([readings.electric], model)
-    return results_of(channels, replace(model, effects=()), model)
+    return results_of(channels, replace(model, effects=()), model), channels.curves(model)
 
 
 def _film(readings: Readings, model: Actuator | Strip) -> _Predicted:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from dearig.report.figures import diagnosis as drawn
+from dearig.report.figures.channels import channel_figure, evidence_figure
 from dearig.report.figures.recordings import comparison_figure
 from dearig.report.figures.residual import residual_panels
 from dearig.report.pages.head import head_of, origins_of
@@ -23,6 +24,7 @@ from dearig.report.pages.html import (
     write_page,
 )
 from dearig.report.pages.laws import LawView, law_view
+from dearig.report.text.channels import channel_table, channel_title
 from dearig.report.text.diagnosis import (
     before_after_table,
     dropped_effects,
@@ -93,6 +95,9 @@ class DiagnosisPage:
     steps: tuple[FoundEffect, ...]
     effects: Table
     unnamed: tuple[str, ...]
+    channels: tuple[Table, ...]
+    channel_pictures: tuple[Picture, ...]
+    denied: tuple[str, ...]
     residuals: tuple[RecordSection, ...]
     missing: tuple[RecordSection, ...]
     rankings: tuple[tuple[Table, Table], ...]
@@ -153,6 +158,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
             ),
         )
     experiments = experiment_table(outcome)
+    channels = channel_table(outcome)
     before_it, after_it = signatures_of(outcome)
     worst = sorted(before_it, key=lambda s: -s.rms / s.noise)[:_DRAWN_MAX]
     return DiagnosisPage(
@@ -167,6 +173,9 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         steps=_steps(outcome, names),
         effects=effect_table(outcome),
         unnamed=_unnamed(outcome),
+        channels=() if channels is None else (channels,),
+        channel_pictures=_channel_pictures(outcome, changed, names),
+        denied=tuple(readable(_with_full_stop(_capitalised(d.text))) for d in finding.denials),
         residuals=tuple(_residual(s, outcome, changed, names) for s in worst),
         missing=tuple(
             _missing(m, outcome, changed, names)
@@ -345,6 +354,38 @@ def _validation_pictures(
                 f"error axes have different scales.{band_caption(before)}{band_caption(after)}",
             )
         )
+    return tuple(found)
+
+
+def _channel_pictures(
+    outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
+) -> tuple[Picture, ...]:
+    """Draw what each channel says of the leading families, and its residuals in one recording."""
+    found, evidence = [], outcome.finding.channel_evidence
+    if evidence:
+        families = [(" + ".join(map(family_label, f.split(" + "))), said) for f, said in evidence]
+        found.append(
+            picture(
+                evidence_figure(families),
+                names,
+                "What each channel adds to the criterion of the best model of each leading "
+                "family. Positive supports the family; a difference of 10 is odds of 150 to 1.",
+            )
+        )
+    for before, after in _paired(outcome.before.train, outcome.after.train)[:1]:
+        for first, last in zip(before.curves, after.curves, strict=True):
+            curves = [("before", drawn.BEFORE, first), ("after", drawn.AFTER, last)]
+            if not changed:
+                curves = [("model", drawn.AFTER, last)]
+            found.append(
+                picture(
+                    channel_figure(curves),
+                    names,
+                    f"{after.name}: {channel_title(last.name)}, means at 200 Hz, with the "
+                    f"prediction, and measured minus predicted. Gain and offset of the channel "
+                    f"are fitted. Dashed lines are the noise of a mean.",
+                )
+            )
     return tuple(found)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import IdentifyOutcome, pooled_over_noise
 from dearig.printable import printable
+from dearig.report.figures.channels import channel_figure
 from dearig.report.figures.data import Column, csv_url, figure_columns, to_csv
 from dearig.report.figures.export import svg
 from dearig.report.figures.parameters import (
@@ -22,12 +23,14 @@ from dearig.report.figures.parameters import (
 )
 from dearig.report.figures.recordings import comparison_figure, loop_figure
 from dearig.report.figures.residual import residual_panels
+from dearig.report.figures.style import MODEL
 from dearig.report.made import made, made_now, one_time
 from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.pdf import check_browser, is_pdf, write_pdf
 from dearig.report.pages.seal import POLICY, sealed
 from dearig.report.stored import Outcome, stored, stored_url
 from dearig.report.text.bands import band_texts
+from dearig.report.text.channels import channel_errors, channel_title
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
 from dearig.report.text.sentences import (
     describe_model,
@@ -121,6 +124,8 @@ class Part:
     summary: tuple[str, ...]
     warnings: tuple[str, ...]
     errors: tuple[Side, ...]
+    channels: tuple[Table, ...]
+    channel_pictures: tuple[Picture, ...]
     overview: tuple[Picture, ...]
     parameters: tuple[Table, ...]
     parameter_pictures: tuple[Picture, ...]
@@ -336,6 +341,8 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         summary=identify_summary(outcome),
         warnings=warnings_of(outcome),
         errors=tuple(errors),
+        channels=_channel_tables((*outcome.train, *outcome.validation)),
+        channel_pictures=_channel_pictures(outcome.train, prefixes),
         overview=(overview,),
         parameters=(parameter_table(fit),),
         parameter_pictures=parameter_pictures,
@@ -356,7 +363,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             ("Computing time", (seconds(outcome.seconds),)),
         ),
         film=outcome.kind == "film",
-        rest_length_known=any(not e.free for e in fit.estimates),
+        rest_length_known=any(not (e.free or e.is_fixed) for e in fit.estimates),
     )
 
 
@@ -369,6 +376,8 @@ def _validate_part(outcome: ValidateOutcome, prefixes: Iterator[str]) -> Part:
         summary=validate_summary(outcome),
         warnings=warnings_of(outcome),
         errors=tuple(_validation_sides(outcome.comparisons, "By recording")),
+        channels=_channel_tables(outcome.comparisons),
+        channel_pictures=_channel_pictures((worst,), prefixes),
         overview=(overview,),
         parameters=(),
         parameter_pictures=(),
@@ -447,6 +456,28 @@ def _comparison_pictures(
             caption = f"{name}: nominal stress against stretch."
             pictures.append(picture(loop_figure(c), prefixes, caption))
     return tuple(pictures)
+
+
+def _channel_tables(comparisons: Sequence[Comparison]) -> tuple[Table, ...]:
+    found = channel_errors("Voltage monitor and current", comparisons)
+    return () if found is None else (found,)
+
+
+def _channel_pictures(
+    comparisons: Sequence[Comparison], prefixes: Iterator[str]
+) -> tuple[Picture, ...]:
+    """Draw the electrical channels of the first recording."""
+    return tuple(
+        picture(
+            channel_figure([("model", MODEL, curve)]),
+            prefixes,
+            f"{c.name}: {channel_title(curve.name)}, means at 200 Hz, with the prediction, and "
+            f"measured minus predicted. Gain and offset of the channel are fitted. Dashed lines "
+            f"are the noise of a mean.",
+        )
+        for c in comparisons[:1]
+        for curve in c.curves
+    )
 
 
 def fitted_rows(

@@ -45,6 +45,7 @@ _TOO_LONG = (
 # Newest samples of a signal that spectra and loops are made of: 131 s at 1 kHz, 1 MB a signal
 _NEWEST = 2**17
 _NEWEST_OF = ("command", "displacement", "residual 0", "residual 1")
+_OF_MODELS = ("model", "drawn", "residual", "rms")  # curves of each overlay model
 _ANSWERS_MAX = 2**16  # of a feedback that are kept: all of 1.8 h at ten a second, then fewer
 _GAP = 2**16  # samples, pushed together for a model that has no past
 
@@ -161,7 +162,8 @@ class Live(RunObserver):
         """Return time in s and values in SI units of a signal, (m,) each, ``first`` to ``last`` s.
 
         ``name`` is command, monitor, current, displacement, channel with the name of a declared one
-        (``channel load_cell``), or model, residual, rms with the number of the model (``model 0``).
+        (``channel load_cell``), or model, drawn (its current), residual, rms with the number of the
+        model (``model 0``).
         Unknown names give empty arrays.
         """
         run = self._run
@@ -212,7 +214,7 @@ class Live(RunObserver):
 @dataclass(frozen=True)
 class _Converted:
     values: dict[str, np.ndarray]
-    models: tuple[np.ndarray, ...]
+    models: tuple[tuple[np.ndarray, np.ndarray], ...]  # displacement and current
 
 
 class _Model:
@@ -227,10 +229,11 @@ class _Model:
     def words(self) -> str:
         return self._words if self.overlay is None else self.overlay.failure
 
-    def advance(self, block: Block) -> np.ndarray:
+    def advance(self, block: Block) -> tuple[np.ndarray, np.ndarray]:
         if self.overlay is None:
-            return np.full(block.counts.shape[1], np.nan)
-        return self.overlay.advance(block)
+            none = np.full(block.counts.shape[1], np.nan)
+            return none, none
+        return self.overlay.advance(block), self.overlay.current
 
 
 class _Run:
@@ -263,7 +266,7 @@ class _Run:
             except (ModelError, ValueError) as error:
                 words = str(error)
             models.append(_Model(overlay, words, self.rate))
-            for name in ("model", "residual", "rms"):
+            for name in _OF_MODELS:
                 self.curves[f"{name} {i}"] = Pyramid(self.total)
         self._models = tuple(models)
         self._followed = (overlays, drive)
@@ -300,7 +303,7 @@ class _Run:
             models.append(
                 _Model(None, _TOO_LONG, self.rate) if there is None else before._models[there]
             )
-            for name in ("model", "residual", "rms"):
+            for name in _OF_MODELS:
                 if there is not None:
                     self.curves[f"{name} {i}"] = before.curves[f"{name} {there}"]
                     if name == "residual":
@@ -339,8 +342,9 @@ class _Run:
             last = values[-max(1, round(_READOUT * self.rate)) :]
             self._newest[name] = float(last[-1] if name == "command" else last.mean())
         measured = taken.values.get("displacement")
-        for i, (model, moved) in enumerate(zip(self._models, taken.models, strict=True)):
+        for i, (model, (moved, drawn)) in enumerate(zip(self._models, taken.models, strict=True)):
             self.curves[f"model {i}"].push(moved)
+            self.curves[f"drawn {i}"].push(drawn)
             if measured is None:
                 continue
             model.running.push(measured, moved)

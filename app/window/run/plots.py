@@ -21,7 +21,7 @@ __all__ = ["PLOTS", "RunPlots"]
 _SCALE = {"voltage": 1e-3, "current": 1e3, "displacement": 1e3, "residual": 1e6}  # kV, mA, mm, um
 _SIGNALS = {
     "voltage": ("Voltage (kV)", ("monitor", "command")),
-    "current": ("Current (mA)", ("current",)),
+    "current": ("Current (mA)", ("current", "drawn 0", "drawn 1")),
     "displacement": ("Displacement (mm)", ("displacement", "model 0", "model 1")),
     "residual": ("Residual (µm)", ("residual 0", "residual 1", "rms 0", "rms 1")),
 }
@@ -174,7 +174,11 @@ class RunPlots(QWidget):
             "monitor": theme.monitor,
             "current": theme.monitor,
             "displacement": theme.measured,
-            **{f"{name} {i}": theme.models[i] for name in ("model", "residual") for i in (0, 1)},
+            **{
+                f"{name} {i}": theme.models[i]
+                for name in ("model", "drawn", "residual")
+                for i in (0, 1)
+            },
             **{f"rms {i}": theme.text for i in (0, 1)},
         }
         for curve in self._planned.values():
@@ -183,7 +187,7 @@ class RunPlots(QWidget):
             curve.set_colour(theme.limit)  # dashes along a curve take longer than the curve
         for signal, curve in self._curves.items():
             # of two curves that coincide, the upper one is dashed and shows the lower one
-            dashed = signal in ("command", "model 1") or signal.startswith("rms")
+            dashed = signal in ("command", "model 1", "drawn 1") or signal.startswith("rms")
             curve.set_colour(colours[signal], dashed)
         for overlay in self.overlays.values():
             overlay.set_theme(theme)
@@ -373,7 +377,7 @@ class RunPlots(QWidget):
         name = overlays[int(number)].name
         if kind == "rms":
             return "RMS, last 1 s"
-        return name if kind == "model" else f"residual of {name}"
+        return name if kind in ("model", "drawn") else f"residual of {name}"
 
     def _exists(self, signal: str) -> bool:
         """Return False for the curves of a model that is not chosen."""

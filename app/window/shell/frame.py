@@ -113,11 +113,15 @@ class MainWindow(QMainWindow):
         return cast(P, self._pages[kind])
 
     def _make_next_page(self) -> bool:
-        """Make a page that has not been needed yet; return False where there is none."""
+        """Make a page, or the guide, that has not been needed yet; return False once all are."""
         kind = next((kind for kind in PAGES if kind not in self._pages), None)
         if kind is not None:
             self.page(kind)
-        return kind is not None
+        elif self._guide is None:
+            self._guide = Guide(self)
+        else:
+            return False
+        return True
 
     def _put(self, page: Page) -> None:
         """Put a new page into its place, which is empty and not shown, and serve its signals."""
@@ -372,6 +376,7 @@ class MainWindow(QMainWindow):
     @Slot()
     def _watch_keys(self) -> None:
         self.stop_keys.watch(self.session.busy)
+        self._apply_colour_scheme()  # one that was chosen meanwhile
 
     @Slot()
     def _rig_or_folder_changed(self) -> None:
@@ -412,19 +417,23 @@ class MainWindow(QMainWindow):
             self.show_page(self.run_page)
 
     def set_colour_scheme(self, name: str) -> None:
-        """Use the colour scheme ``system``, ``light`` or ``dark``."""
+        """Use the colour scheme ``system``, ``light`` or ``dark``; not before a run has ended."""
         self.session.settings.setValue("colour_scheme", name)
+        if self.session.busy:
+            self.session.message.emit("The colours change once the rig is disarmed")
         self._apply_colour_scheme()
 
     @Slot()
     def _apply_colour_scheme(self) -> None:
         name = kept_text(self.session.settings, "colour_scheme", "system")
+        for key, action in self._scheme_actions.items():
+            action.setChecked(key == name)
+        if self.session.busy:
+            return  # Qt restyles all widgets in one go, which takes seconds: STOP would wait
         theme = {"light": LIGHT, "dark": DARK}.get(name) or system_theme()
         application = QApplication.instance()
         if isinstance(application, QApplication):
             apply(application, theme)
-        for key, action in self._scheme_actions.items():
-            action.setChecked(key == name)
         self.session.set_theme(theme)
 
     def _save_state(self) -> None:

@@ -132,10 +132,15 @@ class TrainingTable(QTableWidget):
         return self._checked(_VALIDATE)
 
     def check(self, train: list[Path], validation: list[Path]) -> None:
-        """Check the recordings for training and for validation."""
-        for row, path in enumerate(self._paths()):
-            self._item(row, _TRAIN).setCheckState(_state(path in train))
-            self._item(row, _VALIDATE).setCheckState(_state(path in validation))
+        """Check the recordings for training and for validation; one in both is for validation."""
+        for_validation = set(validation)
+        for_training = set(train) - for_validation
+        with QSignalBlocker(self):  # one signal for all of them: each is answered by all rows
+            for row, path in enumerate(self._paths()):
+                self._item(row, _TRAIN).setCheckState(_state(path in for_training))
+                self._item(row, _VALIDATE).setCheckState(_state(path in for_validation))
+        self.changed.emit()
+        self.viewport().update()
 
     @property
     def chosen(self) -> tuple[Path, ...]:
@@ -229,9 +234,11 @@ class TrainingTable(QTableWidget):
     def _summarised(self, path: Path) -> None:
         row = self._row.get(path)
         if row is not None:
+            checked = self._is_checked(row)
             self._describe(row, self._library.summaries.get(path))
             self._hide_or_show(row)
-            self.changed.emit()  # how the run of a checked recording ended is known now
+            if checked:
+                self.changed.emit()  # how its run ended is known now
 
     def _describe(self, row: int, summary: RecordingSummary | None) -> None:
         if summary is None:
@@ -276,6 +283,10 @@ class TrainingTable(QTableWidget):
             for row, path in enumerate(self._paths())
             if self._item(row, column).checkState() == Qt.CheckState.Checked
         )
+
+    def _is_checked(self, row: int) -> bool:
+        checked = Qt.CheckState.Checked
+        return any(self._item(row, c).checkState() == checked for c in (_TRAIN, _VALIDATE))
 
     def _paths(self) -> list[Path]:
         items = (self._item(row, _NAME) for row in range(self.rowCount()))

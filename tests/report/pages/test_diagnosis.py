@@ -46,6 +46,7 @@ from tests.tools.diagnosis import (
     ROUND,
     STEP,
     diagnose_outcome,
+    electric_outcome,
     film_diagnosis,
     finding,
     nothing_missing,
@@ -56,6 +57,7 @@ OUTCOMES = {
     "explained": diagnose_outcome(),
     "nothing missing": nothing_missing(),
     "a film": film_diagnosis(),
+    "with channels": electric_outcome(),
 }
 MEASURES_UM = {"rms_um", "nrmse_pct", "e_rms_thesis_pct", "e_m_thesis_pct", "max_um"}
 MEASURES_KPA = {"rms_kPa", "nrmse_pct", "e_rms_thesis_pct", "e_m_thesis_pct", "max_kPa"}

@@ -89,8 +89,9 @@ def test_a_model_that_comes_late_runs_through_what_it_has_missed() -> None:
     for part in parts:
         early.block(part)
     early.close()
-    for name in ("model 0", "residual 0", "rms 0"):
+    for name in ("model 0", "drawn 0", "residual 0", "rms 0"):
         np.testing.assert_array_equal(live.view(name, 0.0, 9.0), early.view(name, 0.0, 9.0))
+    assert np.ptp(early.view("drawn 0", 0.0, 9.0)[1]) > 1e-6  # A: a film that moves draws a current
 
 
 def test_a_run_too_long_to_be_kept_goes_on_with_the_models_that_it_has(

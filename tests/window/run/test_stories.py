@@ -448,3 +448,17 @@ def test_colours_follow_the_choice(qtbot: QtBot, window: MainWindow) -> None:
     with qtbot.waitSignal(window.session.theme_changed):
         window.set_colour_scheme("light")
     assert not window.session.theme.dark
+
+
+def test_colours_wait_for_a_run_as_restyling_would_keep_stop_waiting(
+    qtbot: QtBot, window: MainWindow
+) -> None:
+    press(qtbot, window.run_page.arm_button)
+    sheet = QApplication.instance().styleSheet()  # type: ignore[union-attr]
+    window.set_colour_scheme("dark")
+    assert not window.session.theme.dark
+    assert QApplication.instance().styleSheet() == sheet  # type: ignore[union-attr]
+    assert window.status.full_text == "The colours change once the rig is disarmed"
+    window.run_page.runner.disarm("the test")
+    assert window.session.theme.dark
+    window.set_colour_scheme("light")

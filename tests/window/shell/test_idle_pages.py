@@ -9,6 +9,7 @@ from dearig.window.recordings.page import RecordingsPage
 from dearig.window.session.state import Session
 from dearig.window.shell import idle_pages
 from dearig.window.shell.frame import MainWindow
+from dearig.window.shell.guide import Guide
 from dearig.window.shell.idle_pages import IdlePages
 from dearig.window.shell.pages import PAGES
 from tests.window.conftest import SHORT, press
@@ -17,8 +18,10 @@ WAIT = 60_000
 
 
 @pytest.fixture(autouse=True)
-def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def _when_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page follows another at once, and the first not before the test asks for it."""
     monkeypatch.setattr(idle_pages, "_BETWEEN", 1)
+    monkeypatch.setattr(idle_pages, "_AFTER", 1_000_000)
 
 
 def test_pages_are_made_one_by_one_while_nothing_is_armed(session: Session, qtbot: QtBot) -> None:
@@ -66,3 +69,8 @@ def test_an_idle_window_makes_them_all(window: MainWindow, qtbot: QtBot) -> None
     window.idle_pages._timer.start(1)
     qtbot.waitUntil(lambda: window.idle_pages.done, timeout=WAIT)
     assert set(window._pages) == set(PAGES)
+    made = window.findChildren(Guide)
+    assert len(made) == 1  # its pictures are read and scaled
+    window.show_guide()
+    assert window.findChildren(Guide) == made
+    assert made[0].isVisible()

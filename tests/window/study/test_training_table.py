@@ -69,6 +69,33 @@ def test_check_marks_stay_and_a_file_that_became_unreadable_loses_them(
     assert table.item(row, 2).flags() == Qt.ItemFlag.NoItemFlags
 
 
+def test_all_check_marks_together_are_one_change(library: FakeLibrary, qtbot: QtBot) -> None:
+    table = TrainingTable(library)  # type: ignore[arg-type]
+    qtbot.addWidget(table)
+    seen: list[tuple[int, int]] = []
+    table.changed.connect(lambda: seen.append((len(table.train), len(table.validation))))
+    paths = sorted(library.files)
+    table.check(paths, paths[:2])  # one in both is for validation
+    assert seen == [(4, 2)]
+    table.check([], [])
+    assert seen == [(4, 2), (0, 0)]
+
+
+def test_only_what_is_read_of_a_checked_recording_is_a_change(
+    library: FakeLibrary, qtbot: QtBot
+) -> None:
+    table = TrainingTable(library)  # type: ignore[arg-type]
+    qtbot.addWidget(table)
+    checked, other = Path("run-1.h5"), Path("run-2.h5")
+    table.check([checked], [])
+    seen: list[int] = []
+    table.changed.connect(lambda: seen.append(1))
+    library.summarised.emit(other)
+    assert seen == []
+    library.summarised.emit(checked)
+    assert seen == [1]
+
+
 @pytest.fixture
 def many() -> FakeLibrary:
     """Two hundred recordings of ten films, in folders."""
