@@ -11,7 +11,6 @@ from typing import Any
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.run import RunOptions, record
-from dearig.analysis.band import judged_with_bands, prediction_table
 from dearig.analysis.budget import diagnosis_with_budget, given_values
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.experiment import experiment_of, with_excitation
@@ -24,6 +23,7 @@ from dearig.analysis.outcomes import (
     estimate_table,
     pooled_rms,
 )
+from dearig.analysis.readings.band import judged_with_bands, prediction_table
 from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import (
     assumed_by,

@@ -15,12 +15,12 @@ import tomli_w
 
 from dearig.acquisition.plan import Plan, plan
 from dearig.acquisition.prediction import peaks_of
-from dearig.analysis.band import motion_of
 from dearig.analysis.outcomes import (
     DeterminingRecord,
     DiagnoseOutcome,
     SeparatingExperiment,
 )
+from dearig.analysis.readings.band import motion_of
 from dearig.analysis.readings.compatibility import of_rig
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile

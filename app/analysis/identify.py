@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from dearig.analysis.band import prediction_table, with_bands
 from dearig.analysis.budget import given_values
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.outcomes import (
@@ -24,6 +23,7 @@ from dearig.analysis.outcomes import (
     pooled_noise,
     pooled_over_noise,
 )
+from dearig.analysis.readings.band import prediction_table, with_bands
 from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import (
     assumed_by,

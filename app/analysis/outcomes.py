@@ -26,7 +26,7 @@ from dearig.model.verdict import (
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
-    from dearig.analysis.band import PredictionBand
+    from dearig.analysis.readings.band import PredictionBand
     from dearig.config.modelfile import ModelFile
     from dearig.model.diagnosis.events import OneTimeEvent
     from dearig.model.diagnosis.excitation import Excitation, Tested

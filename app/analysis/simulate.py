@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.analysis.band import PredictionBand, band_of
+from dearig.analysis.readings.band import PredictionBand, band_of
 from dearig.analysis.readings.record import Readings
 from dearig.config.modelfile import ModelFile, load_model, model_toml
 from dearig.config.rigfile import RigFile

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from dearig.analysis.band import PredictionBand, band_of, covariance_of
+from dearig.analysis.readings.band import PredictionBand, band_of, covariance_of
 from dearig.analysis.readings.record import Readings
 from dearig.analysis.track_target import WITHIN, missed_parts, task_of
 from dearig.config.modelfile import ModelFile

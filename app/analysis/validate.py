@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from dearig.analysis.band import with_bands
 from dearig.analysis.outcomes import ValidateOutcome
+from dearig.analysis.readings.band import with_bands
 from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.opening import Source
 from dearig.analysis.readings.record import read_all

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-    from dearig.analysis.band import PredictionBand
+    from dearig.analysis.readings.band import PredictionBand
 
 __all__ = ["Prediction"]
 

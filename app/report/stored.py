@@ -255,7 +255,7 @@ def _any(plain: Any) -> Any:
 @cache
 def _hints(kind: type) -> dict[str, Any]:
     """Return the annotations of ``kind``, with those names that only a type checker imports."""
-    from dearig.analysis import band
+    from dearig.analysis.readings import band
     from dearig.config import modelfile
     from dearig.model import fitting, residual
     from dearig.model.diagnosis import events, excitation, results

@@ -24,7 +24,7 @@ from dearig.units import SHOWN
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from dearig.analysis.band import PredictionBand
+    from dearig.analysis.readings.band import PredictionBand
 
 __all__ = ["signal_figure", "voltage_figure"]
 

@@ -12,7 +12,7 @@ from dearig.units import SHOWN
 if TYPE_CHECKING:
     import numpy as np
 
-    from dearig.analysis.band import PredictionBand
+    from dearig.analysis.readings.band import PredictionBand
 
 __all__ = ["NO_BAND", "band_json", "band_texts"]
 
@@ -28,7 +28,7 @@ def band_texts(band: PredictionBand, kind: str, error: np.ndarray | None = None)
 
     ``error`` (N,) in m or Pa is measured less model, where that is known; NaN is no reading.
     """
-    from dearig.analysis.band import TRAINING
+    from dearig.analysis.readings.band import TRAINING
 
     shown = SHOWN[kind]
 

@@ -8,8 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dearig.analysis.band import TRAINING, PredictionBand, band_of, covariance_of, prediction_table
 from dearig.analysis.outcomes import Comparison
+from dearig.analysis.readings.band import (
+    TRAINING,
+    PredictionBand,
+    band_of,
+    covariance_of,
+    prediction_table,
+)
 from dearig.config.modelfile import ModelFile, load_model, save_model
 from dearig.model.fitting import prediction
 from dearig.model.fitting.parameters import FitLayout
