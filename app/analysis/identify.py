@@ -150,10 +150,9 @@ def identify_recordings(
     covariance = covariance_table(fit.covariance_names, fit.covariance)
     model = ModelFile(name, fit.model, {COVARIANCE: covariance})
     validated = with_bands([compare(r, fit.model, "validation") for r in others], others, model)
-    seconds = clock() - started
+    seconds, kind = clock() - started, recordings[0].kind
     history = _history(fit, recordings, compared, validated, spring, drive, seconds)
     model = replace(model, history=history)
-    kind = recordings[0].kind
     is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
     return IdentifyOutcome(
         title=name,
