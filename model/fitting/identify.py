@@ -67,7 +67,8 @@ _POPULATIONS = 20.0  # simulated until a descent counts as half done
 _COARSE_SAMPLES = 1500  # of a film record
 _MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
-_GAIN_LEFT = 0.1  # of the gain that counts: where a fit ends that is reported
+_GAIN_LEFT = 0.1  # of the gain that counts: for it a fit that has converged goes on
+_LAST_STEPS = 3  # at most: in a flat valley each gains a little
 _RESOLVED = 0.2  # of a mean's interval: the shortest relaxation time of a search on means
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
 # Of an interval's width, which means and quicker steps may change: it changes a coverage of 95 %
@@ -453,9 +454,10 @@ def fit_globally(
                 first = layout.fixed
                 x = _descend_on_means(problem, coarse, freed.x, first)
     descents.ended()
-    chi2_there = float(problem.costs(x[None])[0]) * problem.samples
-    enough = _GAIN_LEFT * gain_that_counts(chi2_there, problem.samples)
-    fit = descend(problem, x, first, gain=enough, damping=1e-4)
+    fit = descend(problem, x, first, damping=1e-4)
+    enough = _GAIN_LEFT * gain_that_counts(fit.cost * problem.samples, problem.samples)
+    last = descend(problem, fit.x, first, _LAST_STEPS, enough, 1e-4, known=fit.residuals)
+    fit = replace(last, converged=fit.converged or last.converged)
     problem.on_simulations = counted
     progress("descents", 1.0)
     problem.simulations += coarse.simulations

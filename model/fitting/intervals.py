@@ -221,6 +221,8 @@ def linear_ends(
 
     With the others where the ``jacobian`` (N, f) says that they are refitted to.
     """
+    if not free.any():
+        return np.empty((0, x.size))
     spread = covariance(jacobian.T @ jacobian, CHI2_95)
     reach = layout.reach(x)[free]
     away = spread / np.sqrt(np.diag(spread))[:, None]
