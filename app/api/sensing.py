@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dearig.analysis.readings.opening import Source
-from dearig.analysis.readings.sense import CHARGE_ERROR, SenseOutcome, save_sensed, sense_recording
+from dearig.analysis.readings.sense import SenseOutcome, save_sensed, sense_recording
 from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing
 from dearig.api.models import ModelSource, as_model_file
 from dearig.report.figures.signals import signal_figure
-from dearig.report.sensed import sense_json, sensed_texts
+from dearig.report.sensed import sense_json, sense_sentences, sensed_texts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,7 +52,7 @@ class SenseResult:
     @property
     def sentences(self) -> tuple[str, ...]:
         """How large the error is, and what would reduce it."""
-        return self.outcome.sentences
+        return sense_sentences(self.outcome)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what the command writes as JSON.
@@ -116,7 +116,7 @@ def sense(
     *,
     drive: str = "command",
     gain: float = 1.0,
-    gain_error: float = CHARGE_ERROR,
+    gain_error: float | None = None,
 ) -> SenseResult:
     """Compute the displacement from voltage and current alone, and compare it with the laser.
 
@@ -131,8 +131,9 @@ def sense(
         Voltage: ``command`` or ``monitor``.
     gain : float
         Charge over that of the model, as the laser of another recording of this rig gave it.
-    gain_error : float
-        Relative standard uncertainty of the gain.
+    gain_error : float, optional
+        Relative standard uncertainty of the gain; by default what the recording's rig file states
+        of the scales and the film, and 1 % for each scale of which it states none.
 
     Returns
     -------
