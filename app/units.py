@@ -12,6 +12,7 @@ __all__ = [
     "Shown",
     "ShownChannel",
     "name_and_unit",
+    "parameter_key",
     "parameter_unit",
     "readable",
 ]
@@ -105,6 +106,17 @@ SHOWN_CHANNELS = MappingProxyType(
 def parameter_unit(unit: str) -> tuple[float, str]:
     """Return ``(factor, unit)`` in which a parameter of SI ``unit`` is shown."""
     return (1e-3, "kPa") if unit == "Pa" else (1.0, unit)
+
+
+def parameter_key(name: str, unit: str) -> str:
+    """Return a parameter's ``name`` with the unit in which it is shown: ``mu_0_kPa``.
+
+    ``unit`` is its SI unit. That of an effect is ``linear_drag.drag_Pa_s``.
+    """
+    stem = name.replace(": ", ".").replace(" ", "_")
+    _, shown = parameter_unit(unit)
+    ending = shown.replace("/", "_per_").replace("²", "2").replace("³", "3").replace(" ", "_")
+    return f"{stem}_{ending}" if ending else stem
 
 
 def readable(text: str) -> str:

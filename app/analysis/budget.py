@@ -10,7 +10,7 @@ import numpy as np
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.diagnosis.results import Diagnosis
-from dearig.model.fitting import GivenValue, uncertainty_budget, with_systematic
+from dearig.model.fitting import Constraint, GivenValue, uncertainty_budget, with_systematic
 from dearig.model.fitting.parameters import FitLayout
 from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator
@@ -58,11 +58,13 @@ def diagnosis_with_budget(
     given: Sequence[GivenValue],
     progress: Progress,
     stop: Callable[[], bool],
+    constraints: Sequence[Constraint] = (),
 ) -> Diagnosis:
     """Return ``finding`` with what the uncertainties of ``given`` values do to its parameters.
 
-    ``records`` are those of the training. Without, where the operator has stopped the search, or
-    where ``stop()`` is True before the budget is made.
+    ``records`` are those of the training, ``constraints`` what is stated of parameters. Without,
+    where the operator has stopped the search, or where ``stop()`` is True before the budget is
+    made.
     """
     final = finding.final
     # with the drift, which each record has for itself
@@ -73,7 +75,7 @@ def diagnosis_with_budget(
     budget = uncertainty_budget(
         records, model, held, given,
         # the bar is of the whole work, which the search has filled
-        progress=lambda stage, _: progress(stage, 1.0), stop=stop,
+        progress=lambda stage, _: progress(stage, 1.0), stop=stop, constraints=constraints,
     )  # fmt: skip
     if not budget:
         said = "stopped before the uncertainties of the rig file were taken into account"

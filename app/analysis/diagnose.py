@@ -13,15 +13,17 @@ from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.budget import diagnosis_with_budget, given_values
 from dearig.analysis.cores import for_simulations
-from dearig.analysis.experiment import experiment_of, prediction_errors, with_excitation
+from dearig.analysis.experiment import experiment_of, with_excitation
 from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
     Evaluation,
     budget_table,
     covariance_table,
+    estimate_table,
     pooled_rms,
 )
+from dearig.analysis.readings.band import judged_with_bands, prediction_table
 from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import (
     assumed_by,
@@ -33,7 +35,8 @@ from dearig.analysis.readings.enough import check_enough, extrapolated, few_data
 from dearig.analysis.readings.opening import Source, check_named_once
 from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
 from dearig.analysis.readings.room import air_texts_of, room_texts
-from dearig.config.modelfile import HELD_VOLTAGE, ModelFile
+from dearig.config.modelfile import COVARIANCE, HELD_VOLTAGE, PREDICTION, ModelFile
+from dearig.config.parameterfile import Stated, constraints_of
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence, parse_sequence
 from dearig.errors import (
@@ -49,10 +52,12 @@ from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
-from dearig.model.fitting import GivenValue
+from dearig.model.fitting import Constraint, GivenValue
+from dearig.model.fitting.parameters import NORMAL_95
 from dearig.model.fitting.prediction import prediction_gain
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.strip import Strip
 from dearig.model.verdict import PARTLY_EXPLAINED, UNEXPLAINED
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
@@ -74,6 +79,7 @@ def diagnose_recordings(
     branches: int = 3,
     spring: str = "gent",
     branch_spring: str = "",
+    parameters: Stated | None = None,
     drive: str = "command",
     rig_file: RigFile | None = None,
     thorough: bool = False,
@@ -85,16 +91,19 @@ def diagnose_recordings(
 
     The ``validation`` recordings are read last: of them the search uses the readings before the
     voltage alone, which tell the sensor's noise. ``progress`` receives the fraction of the whole
-    work. ``spring`` and ``branch_spring`` are the strain
-    energies of the baseline. ``ended_early`` is keep, cut or leave-out: what is done
-    with recordings whose runs ended early. A search that is not ``thorough`` ends after about a
-    minute. The first ctrl-C ends it and keeps what was found (``finding.interrupted``); the second
-    raises. Nothing is written; ``save_fitted_model`` writes the improved model. Raises
+    work. ``spring`` and ``branch_spring`` are the strain energies of the baseline. ``parameters``
+    are what is stated of parameters, of springs and of effects
+    (``dearig.config.parameterfile``). ``ended_early`` is keep, cut or leave-out: what is done with
+    recordings whose runs ended early. A search that is not ``thorough`` ends after about a minute.
+    The first ctrl-C ends it and keeps what was found (``finding.interrupted``); the second raises.
+    Nothing is written; ``save_fitted_model`` writes the improved model. Raises
     ``InputError`` for recordings that cannot be diagnosed.
     """
     started = clock()
     check_named_once(train, validation)
-    settings = _Settings(branches, spring, branch_spring, drive, rig_file, thorough, ended_early)
+    settings = _Settings(
+        branches, spring, branch_spring, drive, rig_file, thorough, ended_early, parameters
+    )  # fmt: skip
     fitted, left_out = settings.read(train)
     others, also_left_out = settings.read(validation)
     base, quality = _prepared(fitted, others, settings)
@@ -114,6 +123,7 @@ def diagnose_rig(
     branches: int = 3,
     spring: str = "gent",
     branch_spring: str = "",
+    parameters: Stated | None = None,
     drive: str = "command",
     rig_file: RigFile | None = None,
     configuration: str = "",
@@ -129,14 +139,16 @@ def diagnose_rig(
     The first recording is the thesis's (unless ``train`` are given), then come at most
     ``experiments`` more, for as long as rivals are left; at the end ``VALIDATION`` are recorded
     (unless ``validation`` are given) and read once. All recordings go to the folder ``out``.
-    ``seed`` is of a simulated rig's noise, ``thorough`` and ``ended_early`` as of
+    ``seed`` is of a simulated rig's noise, ``parameters``, ``thorough`` and ``ended_early`` as of
     ``diagnose_recordings``. When ctrl-C, an interlock, an instrument or the disk ends a run, the
     rig is safe and no more is recorded: the results until then are kept, and ``ended`` of the
     outcome says why. Raises the error that ends the first run, and ``NotSafe`` at once.
     """
     started = clock()
     check_named_once(train, validation)
-    settings = _Settings(branches, spring, branch_spring, drive, rig_file, thorough, ended_early)
+    settings = _Settings(
+        branches, spring, branch_spring, drive, rig_file, thorough, ended_early, parameters
+    )  # fmt: skip
     names = [*([] if train else ["thesis"]), *(_experiment_name(n) for n in range(experiments))]
     planned = [*names, *([] if validation else VALIDATION)]
     for name in planned:
@@ -182,6 +194,11 @@ class _Settings:
     rig_file: RigFile | None
     thorough: bool
     ended_early: str
+    parameters: Stated | None
+
+    def constraints(self, base: Actuator | Strip) -> tuple[Constraint, ...]:
+        """Return what is stated of the parameters of ``base`` and of the effects it may lack."""
+        return constraints_of(self.parameters, [base], with_effects=True)
 
     @property
     def rig(self) -> RigFile:
@@ -312,6 +329,7 @@ def _prepared(
         recordings, settings.branches, settings.spring, None, settings.rig_file,
         settings.branch_spring,
     )  # fmt: skip
+    settings.constraints(base)  # refused before the search
     for readings in fitted:
         readings.check_driven()
     said = [f"{each.name}: {sentence}" for each in every for sentence in each.quality.findings]
@@ -347,6 +365,7 @@ def _search(
                 stop=interrupts.asked,
                 thorough=settings.thorough,
                 others=rest,
+                constraints=settings.constraints(base),
             )
     except ModelError as error:
         raise InputError(f"these recordings cannot be diagnosed: {error}") from error
@@ -359,7 +378,10 @@ def _budgeted(
     """Return ``finding`` with the uncertainties of given values, but for the operator's stop."""
     records = [(each.held() if finding.held else each).record for each in fitted]
     with Interrupts() as interrupts:
-        return diagnosis_with_budget(finding, records, settings.given, progress, interrupts.asked)
+        return diagnosis_with_budget(
+            finding, records, settings.given, progress, interrupts.asked,
+            settings.constraints(finding.baseline.model),
+        )  # fmt: skip
 
 
 def _outcome(
@@ -397,6 +419,7 @@ def _outcome(
         for stand, stage in zip(stands, models, strict=True)
     )
     noise = _noise(fitted)
+    stands = (*stands[:-1], judged_with_bands(stands[-1], others, finding.final, {}))
     seconds = clock() - started
     said = (*quality, *dict.fromkeys(failed))
     recordings = recordings_of(fitted)
@@ -424,8 +447,8 @@ def _outcome(
         few_data=few_data(fitted),
         assumed=assumed_by(recordings, settings.rig_file),
         not_compared=tuple(r.name for r in others if r.name not in compared),
-        prediction_errors=prediction_errors(
-            [r for r in others if r.name in compared], finding.final
+        prediction_errors=tuple(
+            NORMAL_95 * c.band.parameters_rms for c in stands[-1].validation if c.band is not None
         ),
         # what happened in the training recordings alone is for no other recording to confirm
         gain=_gain(stands, own, noise) if any(s.may_recur for s in finding.steps) else None,
@@ -438,7 +461,12 @@ def _outcome(
         plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)
         outcome = replace(outcome, model=plain)
     history = _history(outcome, recordings)
-    return replace(outcome, model=replace(outcome.model, history=history))
+    place = -1 if outcome.recommends_final else 0
+    stage = finding.final if outcome.recommends_final else finding.baseline
+    judged = list(outcome.stands)
+    judged[place] = judged_with_bands(judged[place], others, stage, history)
+    model = replace(outcome.model, history=history)
+    return replace(outcome, model=model, stands=tuple(judged))
 
 
 def _title(recordings: Sequence[Recording]) -> str:
@@ -526,6 +554,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
     """Return the origin of the model, for its file."""
     finding, stands = outcome.finding, outcome.stands
     stage = finding.final if outcome.recommends_final else finding.baseline
+    judged = stands[-1] if outcome.recommends_final else stands[0]
     shown = SHOWN[outcome.kind]
 
     def rms(comparisons: Sequence[Comparison]) -> float | None:
@@ -564,20 +593,8 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
             }
             for s in (finding.steps if outcome.recommends_final else ())
         ],
-        "estimate": [
-            {
-                "name": e.name,
-                "unit": e.unit,
-                "value": e.value,
-                "low95": e.low if math.isfinite(e.low) else None,
-                "high95": e.high if math.isfinite(e.high) else None,
-                "determined": e.determined,
-                "at_bound": e.at_bound,
-                "systematic": e.systematic,
-                "note": e.note,
-            }
-            for e in stage.estimates
-        ],
-        "covariance": covariance_table(stage.covariance_names, stage.covariance),
+        "estimate": estimate_table(stage.estimates),
+        COVARIANCE: covariance_table(stage.covariance_names, stage.covariance),
+        PREDICTION: prediction_table(judged.train, judged.validation, outcome.noise),
         "uncertainty_budget": budget_table(stage.budget),
     }

@@ -19,8 +19,11 @@ from dearig.analysis.outcomes import (
     SpringCandidate,
     budget_table,
     covariance_table,
+    estimate_table,
+    pooled_noise,
     pooled_over_noise,
 )
+from dearig.analysis.readings.band import prediction_table, with_bands
 from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import (
     assumed_by,
@@ -33,14 +36,21 @@ from dearig.analysis.readings.opening import Source, check_named_once
 from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
 from dearig.analysis.readings.room import room_texts
 from dearig.analysis.thesis_runs import PUBLISHED_FIT
-from dearig.config.modelfile import ModelFile
+from dearig.config.modelfile import COVARIANCE, PREDICTION, ModelFile
+from dearig.config.parameterfile import Stated, constraints_of
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.diagnosis.spring_choice import choose_springs
 from dearig.model.effects import EffectValues
 from dearig.model.errors import ModelError
 from dearig.model.film.material import Network
-from dearig.model.fitting import Identification, add_intervals, identify, with_budget
+from dearig.model.fitting import (
+    Constraint,
+    Identification,
+    add_intervals,
+    identify,
+    with_budget,
+)
 from dearig.model.readings.records import Record
 from dearig.model.springs import SPRINGS
 from dearig.progress import Progress, quiet
@@ -62,6 +72,7 @@ def identify_recordings(
     spring: str = "gent",
     branch_spring: str = "",
     effects: EffectValues = (),
+    parameters: Stated | None = None,
     drive: str = "command",
     rest_length_mm: float | None = None,
     rig_file: RigFile | None = None,
@@ -79,7 +90,8 @@ def identify_recordings(
     ``spring`` is the strain energy of the equilibrium spring; with ``choose`` each one is fitted
     with each number of branches, and the most probable on the training data is kept
     (``choose_springs``). ``branch_spring`` is that of the branches, "" for the usual one.
-    ``effects`` are fitted too, from these values.
+    ``effects`` are fitted too, from these values. ``parameters`` are what is stated of parameters
+    (``dearig.config.parameterfile``); models with fewer branches leave out what they lack.
     ``ended_early`` is keep, cut or leave-out: what is done with recordings whose runs ended early.
     ``clock`` gives seconds. Nothing is written; ``save_fitted_model`` writes the model. Raises
     ``InputError`` for everything that cannot be fitted.
@@ -105,14 +117,18 @@ def identify_recordings(
 
     springs: tuple[SpringCandidate, ...] = ()
     start: Network | None = None
+    kinds = SPRINGS if spring == CHOOSE else (spring,)
+    stated = constraints_of(parameters, [base_of(n, k) for n in counts for k in kinds])
     if spring == CHOOSE:
-        springs, start = _spring_candidates(records, fitted, others, base_of, counts, progress)
+        springs, start = _spring_candidates(
+            records, fitted, others, base_of, counts, stated, progress
+        )
         spring, counts = springs[0].spring, [springs[0].branches]
     alone = len(counts) == 1
 
     fits = _fits(
         records, lambda n: base_of(n, spring), counts, method, seed, intervals and alone, start,
-        progress,
+        stated, progress,
     )  # fmt: skip
     # one number of independent samples for all, from the fit with the least structured residual
     correlation = max(1.0, min(fit.correlation for fit in fits))
@@ -129,27 +145,30 @@ def identify_recordings(
             fit = add_intervals(records, fit, progress=progress)
     fit = with_budget(records, fit, given, progress=progress)
     compared = [compare(r, fit.model, "train") for r in fitted]
-    validated = [compare(r, fit.model, "validation") for r in others]
-    seconds = clock() - started
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
+    covariance = covariance_table(fit.covariance_names, fit.covariance)
+    model = ModelFile(name, fit.model, {COVARIANCE: covariance})
+    validated = with_bands([compare(r, fit.model, "validation") for r in others], others, model)
+    seconds, kind = clock() - started, recordings[0].kind
     history = _history(fit, recordings, compared, validated, spring, drive, seconds)
-    kind = recordings[0].kind
+    model = replace(model, history=history)
     is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
     return IdentifyOutcome(
         title=name,
         kind=kind,
         method=method,
-        model=ModelFile(name, fit.model, history),
+        model=model,
         fit=fit,
         train=tuple(compared),
-        validation=tuple(validated),
+        validation=with_bands(validated, others, model),
         trials=tuple(trials),
         springs=springs,
         seconds=seconds,
         quality=(
             *left_out,
             *also_left_out,
+            *_without_part(stated, fit),
             *noise_texts((*fitted, *others)),
             *room_texts(recordings_of((*fitted, *others))),
         ),
@@ -159,12 +178,23 @@ def identify_recordings(
     )
 
 
+def _without_part(stated: Sequence[Constraint], fit: Identification) -> list[str]:
+    """Return a sentence on each of ``stated`` whose parameter the fitted model lacks."""
+    has = {e.name for e in fit.estimates}
+    return [
+        f"what is stated of {c.name} has no part: the model that was chosen lacks it"
+        for c in stated
+        if c.name not in has
+    ]
+
+
 def _spring_candidates(
     records: Sequence[Record],
     train: Sequence[Readings],
     others: Sequence[Readings],
     base_of: Callable[[int, str], Any],
     counts: Sequence[int],
+    stated: Sequence[Constraint],
     progress: Progress,
 ) -> tuple[tuple[SpringCandidate, ...], Network]:
     """Return every strain energy with every number of branches, the most probable first.
@@ -174,7 +204,9 @@ def _spring_candidates(
     """
     kinds = [(kind, count) for kind in SPRINGS for count in counts]
     try:
-        trials = choose_springs(records, [base_of(n, k) for k, n in kinds], progress=progress)
+        trials = choose_springs(
+            records, [base_of(n, k) for k, n in kinds], progress=progress, constraints=stated
+        )
     except ModelError as error:
         raise InputError(f"these recordings cannot be fitted: {error}") from error
     found: list[SpringCandidate] = []
@@ -207,6 +239,7 @@ def _fits(
     seed: int,
     intervals: bool,
     smaller: Network | None,
+    stated: Sequence[Constraint],
     progress: Progress,
 ) -> list[Identification]:
     """Return the fit for each number of branches in ``counts``, which rise.
@@ -225,7 +258,10 @@ def _fits(
                 progress(f"{counts[done]} branches", (done + fraction) / len(counts))
 
         try:
-            fit = identify(records, base, method, seed, intervals, smaller, progress=report)
+            fit = identify(
+                records, base, method, seed, intervals, smaller, progress=report,
+                constraints=stated,
+            )  # fmt: skip
         except ModelError as error:
             raise InputError(f"these recordings cannot be fitted: {error}") from error
         smaller = fit.model.network
@@ -237,7 +273,8 @@ def _bic(fit: Identification, records: Sequence[Record], correlation: float) -> 
     """Return the Bayesian information criterion, for the number of independent residuals."""
     samples = sum(r.measured.size for r in records) / correlation
     free = sum(e.free for e in fit.estimates)
-    return float(samples * math.log(fit.cost) + free * math.log(max(samples, 2.0)))
+    misfit = samples * math.log(fit.cost) + fit.prior_chi2
+    return float(misfit + free * math.log(max(samples, 2.0)))
 
 
 def _trial(
@@ -303,20 +340,8 @@ def _history(
             {**figures(c), "sha256": r.sha256} for c, r in zip(train, recordings, strict=True)
         ],
         "validation": [figures(c) for c in validation],
-        "estimate": [
-            {
-                "name": e.name,
-                "unit": e.unit,
-                "value": e.value,
-                "low95": e.low if e.low > 0.0 else None,
-                "high95": e.high if math.isfinite(e.high) else None,
-                "determined": e.determined,
-                "at_bound": e.at_bound,
-                "systematic": e.systematic,
-                "note": e.note,
-            }
-            for e in fit.estimates
-        ],
-        "covariance": covariance_table(fit.covariance_names, fit.covariance),
+        "estimate": estimate_table(fit.estimates),
+        COVARIANCE: covariance_table(fit.covariance_names, fit.covariance),
+        PREDICTION: prediction_table(train, validation, pooled_noise(train) or 0.0),
         "uncertainty_budget": budget_table(fit.budget),
     }

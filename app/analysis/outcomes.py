@@ -26,11 +26,12 @@ from dearig.model.verdict import (
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
+    from dearig.analysis.readings.band import PredictionBand
     from dearig.config.modelfile import ModelFile
     from dearig.model.diagnosis.events import OneTimeEvent
     from dearig.model.diagnosis.excitation import Excitation, Tested
     from dearig.model.diagnosis.results import Diagnosis
-    from dearig.model.fitting import Contribution, Identification
+    from dearig.model.fitting import Constraint, Contribution, Estimate, Identification
     from dearig.model.fitting.channels import ChannelCurve, ChannelResult
     from dearig.model.readings.measures import Errors
     from dearig.recording.reading.early_end import EarlyEnd
@@ -48,7 +49,9 @@ __all__ = [
     "SpringCandidate",
     "ValidateOutcome",
     "budget_table",
+    "constraint_table",
     "covariance_table",
+    "estimate_table",
     "noise_from",
     "pooled_noise",
     "pooled_over_noise",
@@ -82,7 +85,8 @@ class Comparison:
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
     ``step`` is the converter step of ``measured``, 0.0 where it is not known; each reading is the
     mean of ``average`` conversions. ``channels`` are the electrical channels, with what the plain
-    circuit and the model leave of them; ``curves`` are those that are used, over time.
+    circuit and the model leave of them; ``curves`` are those that are used, over time. ``band`` is
+    that of the prediction; None where the model has none.
     """
 
     name: str
@@ -108,6 +112,7 @@ class Comparison:
     average: int = 1
     channels: tuple[ChannelResult, ...] = ()
     curves: tuple[ChannelCurve, ...] = ()
+    band: PredictionBand | None = None
 
     @property
     def is_simulated(self) -> bool:
@@ -478,6 +483,37 @@ class DiagnoseOutcome:
 
 
 _Fitted = TypeVar("_Fitted", bound=IdentifyOutcome | DiagnoseOutcome)
+
+
+def constraint_table(constraint: Constraint | None) -> dict[str, float] | None:
+    """Return what was stated of a parameter, in SI units; None where nothing was."""
+    if constraint is None:
+        return None
+    found = {key: getattr(constraint, key) for key in ("fixed", "low", "high", "mean", "sd")}
+    return {key: float(value) for key, value in found.items() if value is not None}
+
+
+def estimate_table(estimates: Sequence[Estimate]) -> list[dict[str, Any]]:
+    """Return ``estimates`` in SI units for a model's history; an open end is None."""
+
+    def end(e: Estimate, value: float) -> float | None:
+        return None if e.is_fixed or value == 0.0 or not math.isfinite(value) else value
+
+    return [
+        {
+            "name": e.name,
+            "unit": e.unit,
+            "value": e.value,
+            "low95": end(e, e.low),
+            "high95": end(e, e.high),
+            "determined": e.determined,
+            "at_bound": e.at_bound,
+            "systematic": e.systematic,
+            "note": e.note,
+            "stated": constraint_table(e.constraint),
+        }
+        for e in estimates
+    ]
 
 
 def save_fitted_model(outcome: _Fitted, path: str | Path, overwrite: bool = False) -> _Fitted:

@@ -16,6 +16,7 @@ from dearig.api.predictions import Prediction
 from dearig.api.recordings import RigSource, load_rig
 from dearig.api.results import DiagnoseResult, IdentifyResult, ValidateResult
 from dearig.api.sequences import Sequence, SequenceSource
+from dearig.config.parameterfile import Stated, load_parameter_file
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.reading.recording import Recording
@@ -24,6 +25,16 @@ __all__ = ["diagnose", "identify", "simulate", "validate"]
 
 #: A recording or the path of one, or several.
 Recordings = Source | Iterable[Source]
+
+
+#: What is known of parameters: a parameter file, or a mapping of the same form.
+ParameterSource = Path | str | Stated
+
+
+def _stated(parameters: ParameterSource | None) -> Stated:
+    if parameters is None:
+        return {}
+    return load_parameter_file(parameters) if isinstance(parameters, Path | str) else parameters
 
 
 def _listed(recordings: Recordings) -> list[Source]:
@@ -48,6 +59,7 @@ def identify(
     branches: int | Iterable[int] = 3,
     spring: str = "gent",
     branch_spring: str = "",
+    parameters: ParameterSource | None = None,
     drive: str = "command",
     rest_length_mm: float | None = None,
     rig_file: RigSource | None = None,
@@ -76,6 +88,9 @@ def identify(
     branch_spring : str
         Strain energy of the branches. The default is ``spring`` where that is one of the first
         three, otherwise ``gent``.
+    parameters : path or mapping, optional
+        What is known of parameters: a parameter file, or a mapping of the same form, such as
+        ``{"mu_0_kPa": {"mean": 46.0, "sd": 0.5}, "T_1_s": {"low": 0.1}}``.
     drive : str
         Voltage that drives the model: ``command`` or ``monitor``.
     rest_length_mm : float, optional
@@ -116,6 +131,7 @@ def identify(
         branches=[branches] if isinstance(branches, int) else list(branches),
         spring=spring,
         branch_spring=branch_spring,
+        parameters=_stated(parameters),
         drive=drive,
         rest_length_mm=rest_length_mm,
         rig_file=None if rig_file is None else load_rig(rig_file)[0],
@@ -177,6 +193,7 @@ def simulate(
     *,
     rig_file: RigSource | None = None,
     voltage: str = "command",
+    band: bool = True,
 ) -> Prediction:
     """Compute what a model predicts under a recording or a sequence.
 
@@ -191,6 +208,8 @@ def simulate(
         Sample rate of a sequence.
     voltage : str
         Voltage of a recording that drives the model: ``command`` or ``monitor``.
+    band : bool
+        Compute the 95 % band, if the model has a covariance: two simulations for each parameter.
 
     Returns
     -------
@@ -207,10 +226,13 @@ def simulate(
     >>> import dearig
     >>> predicted = dearig.simulate("model.toml", "validation-a-0.4")
     >>> predicted.response.max()  # in m
+    >>> predicted.low95, predicted.high95, predicted.band.parameters
     """
     played = drive.loaded if isinstance(drive, Sequence) else drive
     settings = None if rig_file is None else load_rig(rig_file)[0]
-    found = simulate_model(as_model_file(model), played, rig_file=settings, voltage=voltage)
+    found = simulate_model(
+        as_model_file(model), played, rig_file=settings, voltage=voltage, band=band
+    )
     return Prediction(found)
 
 
@@ -222,6 +244,7 @@ def diagnose(
     branches: int = 3,
     spring: str = "gent",
     branch_spring: str = "",
+    parameters: ParameterSource | None = None,
     drive: str = "command",
     rig_file: RigSource | None = None,
     thorough: bool = False,
@@ -243,6 +266,9 @@ def diagnose(
         Number of Maxwell branches of the baseline.
     spring, branch_spring : str
         Strain energies of the baseline, as for ``identify``.
+    parameters : path or mapping, optional
+        What is known of parameters, as for ``identify``, also of effects that may be found:
+        ``{"linear_drag.drag_Pa_s": {"high": 50.0}}``.
     drive : str
         Voltage that drives the model: ``command`` or ``monitor``.
     rig_file : path or mapping, optional
@@ -278,6 +304,7 @@ def diagnose(
         branches=branches,
         spring=spring,
         branch_spring=branch_spring,
+        parameters=_stated(parameters),
         drive=drive,
         rig_file=None if rig_file is None else load_rig(rig_file)[0],
         thorough=thorough,

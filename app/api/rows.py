@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, overload
 
+from dearig.analysis.outcomes import constraint_table
 from dearig.api.display import table_html
 from dearig.extras import import_extra
 from dearig.report.text.numbers import NO_VALUE, interval_ends, quoted, significant
@@ -35,7 +36,9 @@ class Parameter:
 
     ``low95`` and ``high95`` are 0 or infinite where the data leave an end open. A parameter that is
     not ``determined`` could have other values with the same error. ``effect`` is the effect that it
-    belongs to, "" for the springs.
+    belongs to, "" for the springs. ``stated`` is what was stated of it before the fit (fixed, low,
+    high, mean, sd) in the same unit, None where nothing was; both ends of a fixed one are its
+    value.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Parameter:
     high95: float
     determined: bool
     effect: str = ""
+    stated: dict[str, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -153,7 +157,16 @@ def parameters_of(estimates: Sequence[Estimate], effect: str = "") -> list[Param
         One parameter for each estimate.
     """
     return [
-        Parameter(e.name, e.value, e.unit, e.low, e.high, bool(e.determined), effect)
+        Parameter(
+            e.name,
+            e.value,
+            e.unit,
+            e.low,
+            e.high,
+            bool(e.determined),
+            effect,
+            constraint_table(e.constraint),
+        )
         for e in estimates
     ]
 

@@ -10,15 +10,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dearig.cli.options import (
+    Bounds,
     Branches,
     Drive,
     DriveChannel,
     EndedEarly,
     EndedEarlyOption,
+    Fixed,
     Force,
     Json,
     ManyToValidate,
     Method,
+    ParameterFile,
+    Priors,
     Recording,
     Report,
     RigFileOption,
@@ -26,6 +30,7 @@ from dearig.cli.options import (
     SpringChoice,
     SpringKind,
     Validation,
+    stated_by,
 )
 from dearig.cli.output import (
     check_files,
@@ -167,6 +172,10 @@ def identify(
             metavar="MODEL.toml", help="Fit the effects of this model too, from its values."
         ),
     ] = None,
+    parameters: ParameterFile = None,
+    fix: Fixed = None,
+    bound: Bounds = None,
+    prior: Priors = None,
     drive: Drive = DriveChannel.command,
     rest_length_mm: Annotated[
         float | None,
@@ -198,8 +207,9 @@ def identify(
     from dearig.report.as_json import result_json
 
     numbers = _branches(branches)
-    given = (*train, *(validate_ or []), rig_file, effects_of)
+    given = (*train, *(validate_ or []), rig_file, effects_of, parameters)
     check_files(force, given, out, *optional(report), json=json)
+    stated = stated_by(parameters, fix, bound, prior)
     with working(json) as (console, progress):
         fitted, others = open_recordings(console, train, validate_ or [], ended_early.value)
         outcome = identify_recordings(
@@ -210,6 +220,7 @@ def identify(
             spring=spring,
             branch_spring=branch_spring or "",
             effects=() if effects_of is None else load_model(effects_of).model.effects,
+            parameters=stated,
             drive=drive.value,
             rest_length_mm=rest_length_mm,
             rig_file=None if rig_file is None else load_rig_file(rig_file),
@@ -290,6 +301,10 @@ def diagnose(
     branches: BaselineBranches = 3,
     spring: BaselineSpring = "gent",
     branch_spring: BranchSpring = None,
+    parameters: ParameterFile = None,
+    fix: Fixed = None,
+    bound: Bounds = None,
+    prior: Priors = None,
     drive: Drive = DriveChannel.command,
     rig_file: RigFileOption = None,
     rig: RigToRecordOn = None,
@@ -321,8 +336,10 @@ def diagnose(
             "shows both"
         )
     check_files(
-        force, (*given, *others, rig_file), *optional(report), *optional(model_out), json=json
-    )
+        force, (*given, *others, rig_file, parameters), *optional(report), *optional(model_out),
+        json=json,
+    )  # fmt: skip
+    stated = stated_by(parameters, fix, bound, prior)
     settings = None if rig_file is None else load_rig_file(rig_file)
     of_branches = branch_spring or ""
     if rig is not None:
@@ -333,14 +350,14 @@ def diagnose(
         if rig is None:
             outcome = diagnose_recordings(
                 fitted, validation=untouched, branches=branches, spring=spring,
-                branch_spring=of_branches, drive=drive.value, rig_file=settings,
+                branch_spring=of_branches, parameters=stated, drive=drive.value, rig_file=settings,
                 thorough=thorough, ended_early=ended_early.value, progress=progress,
             )  # fmt: skip
         else:
             outcome = diagnose_rig(
                 rig, out, experiments=experiments, train=fitted, validation=untouched,
                 branches=branches, spring=spring, branch_spring=of_branches,
-                drive=drive.value, rig_file=settings,
+                parameters=stated, drive=drive.value, rig_file=settings,
                 configuration="" if rig_file is None else read_text(rig_file, "rig file"),
                 seed=seed, thorough=thorough, ended_early=ended_early.value, overwrite=force,
                 progress=progress,
@@ -384,29 +401,52 @@ def simulate(
         DriveChannel,
         typer.Option(help="Voltage of a recording that drives the model."),
     ] = DriveChannel.command,
+    band: Annotated[
+        bool,
+        typer.Option(
+            help="Compute the 95 % band by the errors of parameters, readings and law; two "
+            "simulations for each parameter."
+        ),
+    ] = True,
     rig_file: RigFileOption = None,
+    report: Report = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Compute what a model predicts under a recorded or planned drive."""
+    """Compute what a model predicts under a recorded or planned drive, with its 95 % band."""
     from dearig.analysis.simulate import save_prediction, simulate_model
     from dearig.config.rigfile import load_rig_file
+    from dearig.report.text.bands import NO_BAND, band_json, band_texts
+    from dearig.report.text.sentences import pull_in_text
 
-    check_files(force, (model, drive, rig_file), out, json=json)
+    check_files(force, (model, drive, rig_file), out, *optional(report), json=json)
     with working(json) as (console, _):
         prediction = simulate_model(
             model,
             drive,
             rig_file=load_rig_file(rig_file),
             voltage=voltage.value,
+            band=band,
         )
         written = save_prediction(prediction, out, force)
+        if report is not None:
+            from dearig.api.predictions import Prediction
+
+            Prediction(prediction).to_html(report)
     print_line(console, str(written))
+    if report is not None:
+        print_line(console, f"Report: {report}")
+    if prediction.band is not None:
+        for text in band_texts(prediction.band, prediction.kind):
+            print_line(console, text)
+    elif band:
+        print_line(console, NO_BAND)
     if prediction.field_max is not None:
-        limit = "no static pull-in if the springs stiffen as the model's locking limits have it"
-        if prediction.pull_in is not None:
-            limit = f"static pull-in at {prediction.pull_in * 1e-3:.3g} kV"
-        print_line(console, f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; {limit}")
+        print_line(
+            console,
+            f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; static pull-in: "
+            f"{pull_in_text(prediction)}",
+        )
     write_result(
         {
             "format": "dearig-simulation/1",
@@ -415,6 +455,8 @@ def simulate(
             "out": str(written),
             "true_field_max_V_per_m": prediction.field_max,
             "pull_in_voltage_V": prediction.pull_in,
+            "locking_limits_not_determined": list(prediction.open_limits),
+            "band": band_json(prediction.band, prediction.kind),
         },
         json,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 from enum import StrEnum
 from pathlib import Path
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "SPRING_KINDS",
+    "Bounds",
     "Branches",
     "Drive",
     "DriveChannel",
@@ -27,6 +29,7 @@ __all__ = [
     "EndedEarlyOption",
     "Faults",
     "FilmName",
+    "Fixed",
     "Force",
     "Fsync",
     "Json",
@@ -39,6 +42,8 @@ __all__ = [
     "NotifyWebhook",
     "Operator",
     "Paced",
+    "ParameterFile",
+    "Priors",
     "Recording",
     "Report",
     "Rig",
@@ -48,6 +53,7 @@ __all__ = [
     "SpringKind",
     "Validation",
     "notify_from",
+    "stated_by",
 ]
 
 
@@ -165,6 +171,82 @@ Paced = Annotated[
     typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
 ]
 Operator = Annotated[str, typer.Option(help="Name of the operator, kept in the recording.")]
+
+# ---------------------------------------------------------------- what is known of parameters
+
+ParameterFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--parameters",
+        metavar="FILE.toml",
+        help="What is known of parameters: fixed values, bounds, priors; a table for each.",
+    ),
+]
+Fixed = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fix",
+        metavar="NAME=VALUE",
+        help="Do not fit this parameter, as in mu_1_kPa=60. Can be repeated, as can --bound and "
+        "--prior.",
+    ),
+]
+Bounds = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--bound",
+        metavar="NAME=LOW..HIGH",
+        help="Fit this parameter within bounds, as in T_1_s=0.1..1; one of them may be left out.",
+    ),
+]
+Priors = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--prior",
+        metavar="NAME=MEAN+-SD",
+        help="Weigh a Gaussian prior of this parameter, as in mu_0_kPa=46+-0.5.",
+    ),
+]
+
+_NUMBER = r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*"
+#: Options by which a person states something of a parameter, the form of their values, their keys.
+_STATEMENTS = (
+    ("--fix", "NAME=VALUE", _NUMBER, ("fixed",)),
+    ("--bound", "NAME=LOW..HIGH", rf"(?:{_NUMBER})?\.\.(?:{_NUMBER})?", ("low", "high")),
+    ("--prior", "NAME=MEAN+-SD", rf"{_NUMBER}(?:\+-|±){_NUMBER}", ("mean", "sd")),
+)
+
+
+def stated_by(
+    path: Path | None, fixed: list[str] | None, bounds: list[str] | None, priors: list[str] | None
+) -> dict[str, dict[str, float]]:
+    """Return what a file and the options state of parameters.
+
+    Options replace what the file says of the same parameter. Raises ``InputError`` for a value that
+    is not of its option's form, and for one that is given twice.
+    """
+    from dearig.config.parameterfile import load_parameter_file
+
+    found: dict[str, dict[str, float]] = {}
+    for given, (option, form, pattern, keys) in zip(
+        (fixed, bounds, priors), _STATEMENTS, strict=True
+    ):
+        for text in given or []:
+            name, _, value = text.partition("=")
+            match = re.fullmatch(pattern, value)
+            numbers = {
+                key: float(number)
+                for key, number in zip(keys, match.groups() if match else (), strict=False)
+                if number is not None
+            }
+            if not (name.strip() and numbers):
+                raise InputError(f"{option} {text!r} is not of the form {form}")
+            table = found.setdefault(name.strip(), {})
+            if table.keys() & numbers.keys():
+                raise InputError(f"{option} is given twice for {name.strip()}")
+            table |= numbers
+    return {**({} if path is None else load_parameter_file(path)), **found}
+
 
 # ---------------------------------------------------------------- notifications
 

@@ -16,6 +16,7 @@ from dearig.analysis.outcomes import (
 from dearig.model.verdict import is_rejected, smallest_p
 from dearig.report.made import made_now
 from dearig.report.stored import Outcome, stored
+from dearig.report.text.bands import band_json
 from dearig.report.text.laws import effect_named, law_json
 from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
@@ -82,6 +83,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         **_noise_json(outcome.kind, outcome.train),
         "residual_over_noise": _number(pooled_over_noise(outcome.train)),
         **_rejection_json(outcome.train),
+        "prior_p": _number(fit.prior_p),
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
         "sums": [_parameter_json(e, known) for e in fit.sums],
         "covariance": covariance_table(fit.covariance_names, fit.covariance),
@@ -123,13 +125,30 @@ def _parameter_json(estimate: Estimate, known: bool) -> dict[str, Any]:
         "name": estimate.name,
         "value": _number(estimate.value),
         "unit": estimate.unit,
-        "ci95": [low, high] if known or not estimate.free else [None, None],
+        "ci95": [low, high] if _has_interval(estimate, known) else [None, None],
         "determined": bool(estimate.determined),
         "free": bool(estimate.free),
         "systematic": _number(estimate.systematic),
-        "ci95_combined": combined if known else [None, None],
+        "ci95_combined": combined if known and not estimate.is_fixed else [None, None],
         "at_bound": bool(estimate.at_bound),
         "note": estimate.note,
+        **_stated_json(estimate),
+    }
+
+
+def _has_interval(estimate: Estimate, known: bool) -> bool:
+    return not estimate.is_fixed and (known or not estimate.free)
+
+
+def _stated_json(estimate: Estimate) -> dict[str, Any]:
+    """What was stated of a parameter before the fit, in SI units; None where nothing was."""
+    stated = estimate.constraint
+    bounds = None if stated is None or not stated.is_bounded else [stated.low, stated.high]
+    prior = None if stated is None or stated.mean is None else stated
+    return {
+        "fixed": estimate.is_fixed,
+        "bounds": bounds,
+        "prior": None if prior is None else {"mean": prior.mean, "sd": prior.sd},
     }
 
 
@@ -158,8 +177,14 @@ def _comparison_json(comparison: Comparison) -> dict[str, Any]:
         "published": _published_json(comparison.published),
         "ended_early": _end_json(comparison),
         "channels": _channels_json(comparison.channels),
+        "band": _band_json(comparison),
         "warnings": list(comparison.warnings),
     }
+
+
+def _band_json(comparison: Comparison) -> dict[str, Any] | None:
+    error = comparison.measured - comparison.model
+    return band_json(comparison.band, comparison.kind, error)
 
 
 def _channels_json(channels: tuple[ChannelResult, ...]) -> list[dict[str, Any]]:
@@ -333,6 +358,10 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         },
         "experiment_words": outcome.experiment_words,
         "excitation": _excitation_json(outcome),
+        "bands": {
+            c.name: _band_json(c)
+            for c in (outcome.after if outcome.recommends_final else outcome.before).validation
+        },
         "rounds": [
             {
                 "base": list(r.base),
@@ -476,16 +505,18 @@ def _selection_json(stage: Stage, train: tuple[Comparison, ...], kind: str) -> d
 
 
 def _effect_number_json(estimate: Estimate) -> dict[str, Any]:
+    fixed = estimate.is_fixed
     return {
         "name": estimate.name,
         "value": _number(estimate.value),
         "unit": estimate.unit,
-        "ci95": [_number(estimate.low), _number(estimate.high)],
+        "ci95": [None, None] if fixed else [_number(estimate.low), _number(estimate.high)],
         "determined": bool(estimate.determined),
         "systematic": _number(estimate.systematic),
-        "ci95_combined": [_number(end) for end in estimate.combined],
+        "ci95_combined": [None, None] if fixed else [_number(end) for end in estimate.combined],
         "at_bound": bool(estimate.at_bound),
         "note": estimate.note,
+        **_stated_json(estimate),
     }
 
 

@@ -31,7 +31,7 @@ from dearig.model.fitting.identify import fit_globally, is_worth_freeing
 from dearig.model.fitting.intervals import correlation_time, is_flat
 from dearig.model.fitting.levenberg import LocalFit, descend
 from dearig.model.fitting.parallel import Job, Result, parallel_map
-from dearig.model.fitting.parameters import FitLayout
+from dearig.model.fitting.parameters import Constraint, FitLayout
 from dearig.model.fitting.search import voltage_starts
 from dearig.model.fitting.slow_noise import (
     DriftSpace,
@@ -67,8 +67,9 @@ class Fit:
     """A model fitted to the records: coordinates ``x`` (d,) in the layout of ``problem``.
 
     ``fixed`` (d,) bool were held. ``cost`` is the mean square of the whitened residuals (N,) of the
-    displacement, in units of the noise; ``jacobian`` (N, f) is one near ``x``, or not finite. It
-    has further rows where electrical channels take part in the fit.
+    displacement, in units of the noise, in which a prior counts as a reading; ``jacobian`` (N, f)
+    is one near ``x``, or not finite. It has further rows where priors or electrical channels take
+    part in the fit.
     """
 
     problem: WhitenedProblem
@@ -138,7 +139,8 @@ class Fit:
     def has_fastest_branch(self) -> bool:
         """Whether a branch has the shortest time of the search: it may imitate a faster effect."""
         layout = self.problem.layout
-        times = layout.column("T")
+        # a time that is stated imitates nothing
+        times = [j for j in layout.column("T") if layout.quantities[j].constraint is None]
         return bool(np.any(np.isclose(self.x[times], layout.lower[times])))
 
     @cached_property
@@ -203,7 +205,7 @@ class Fitter:
     ``raw`` are the full ones without spikes, noise with heavy tails included. The readings at rest
     of ``others``, records of the same sensor, tell the colour of its noise.
     ``watched`` is called after each population of simulations, from any thread, and may raise to
-    end the search.
+    end the search. ``constraints`` are what is stated of parameters, of springs and of effects.
     """
 
     def __init__(
@@ -214,8 +216,10 @@ class Fitter:
         workers: int = 2,
         watched: Callable[[], None] = lambda: None,
         others: Sequence[Record] = (),
+        constraints: Sequence[Constraint] = (),
     ) -> None:
         self.base, self.settings, self.workers = base, settings, workers
+        self.constraints = tuple(constraints)
         self.others = tuple(others)
         self._measured = tuple(records)
         self.full = self.raw = tuple(with_model_error(r) for r in records)
@@ -336,7 +340,8 @@ class Fitter:
 
         Relaxation times are those of the search unless a ``layout`` is given.
         """
-        layout = layout or FitLayout(model, self.times if self.of_actuator else None)
+        times = self.times if self.of_actuator else None
+        layout = layout or FitLayout(model, times, constraints=self.constraints)
         records = self.full if full else self.records
         noise = self.space(full).drift(drift) if self.of_actuator else None
         how: dict[str, Any] = {
@@ -372,7 +377,7 @@ class Fitter:
         held[layout.shapes] = True
         if self._limits.size:
             held[: self._limits.size] = self._limits
-        return held
+        return held | layout.fixed
 
     def _coarse_columns(self, problem: WhitenedProblem) -> np.ndarray | None:
         """Return which derivatives coarse drives give: asked once of each set of effects."""
@@ -512,7 +517,7 @@ class Fitter:
         fits = [self.careful(baseline, iterations)]
         if not self.of_actuator:
             return fits[0]
-        layout = FitLayout(baseline.model)
+        layout = FitLayout(baseline.model, constraints=self.constraints)
         problem = self.problem(baseline.model, layout=layout)
         own = baseline.problem.layout.values(baseline.x)
         # the shortest branch as a drag: modulus times relaxation time is what slow motion shows
@@ -531,10 +536,10 @@ class Fitter:
         best = min(wide, key=lambda f: f.cost)
         fixed, gain = best.fixed, gain_that_ends(best, REPORTED_TOLERANCE)
         found = descend(problem, best.x, fixed, _BASELINE_ITERATIONS, gain, 1e-4, quick=True)
-        none = np.zeros_like(fixed)
-        freed = descend(problem, found.x, none, _BASELINE_ITERATIONS, gain, quick=True)
-        if is_worth_freeing(problem, found.cost, freed, int(fixed.sum())):
-            found, fixed = freed, none
+        stated, limits = layout.fixed, int(np.count_nonzero(fixed & ~layout.fixed))
+        freed = descend(problem, found.x, stated, _BASELINE_ITERATIONS, gain, quick=True)
+        if is_worth_freeing(problem, found.cost, freed, limits):
+            found, fixed = freed, stated
         every = self.careful_problem(baseline.model, 0.0, layout)
         found = descend(every, found.x, fixed, iterations, gain, 1e-4, quick=True)
         fits.append(fit_of(every, fixed, found))
@@ -556,9 +561,10 @@ class Fitter:
     ) -> Fit:
         """The same of strips; the limits are free where that explains significantly more."""
         found, fixed = fit_globally(problem, None, progress, stiffening=False)
-        if fixed.any():
+        limits = int(np.count_nonzero(fixed & ~problem.layout.fixed))
+        if limits:
             freed, free = fit_globally(problem, None, progress)
-            if is_worth_freeing(problem, found.cost, freed, int(fixed.sum())):
+            if is_worth_freeing(problem, found.cost, freed, limits):
                 found, fixed = freed, free
         self._limits = fixed
         return fit_of(problem, fixed, found)
@@ -574,9 +580,9 @@ def gain_that_ends(fit: Fit, part: float = _GAIN_PART) -> float:
 
 def fit_of(problem: WhitenedProblem, fixed: np.ndarray, found: LocalFit) -> Fit:
     """Return what a descent has ``found`` for ``problem``, with parameters ``fixed`` (d,)."""
-    if isinstance(problem, JointProblem):
-        readings, rows = np.split(found.residuals, problem.edges[-1:])
+    readings, rows = problem.of_readings(found.residuals), problem.of_channels(found.residuals)
+    cost = found.cost
+    if rows.size:
         left = found.cost * problem.samples - float(rows @ rows)
-        cost = left / problem.readings_fitted
-        return Fit(problem, found.x, fixed, cost, readings, found.jacobian)
-    return Fit(problem, found.x, fixed, found.cost, found.residuals, found.jacobian)
+        cost = left / (problem.samples - rows.size)
+    return Fit(problem, found.x, fixed, cost, readings, found.jacobian)

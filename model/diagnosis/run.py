@@ -11,6 +11,7 @@ from dearig.model.diagnosis.engine import Search, SearchResult
 from dearig.model.diagnosis.fits import Fit, Fitter
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.fitting.parameters import Constraint
 from dearig.model.readings.records import ActuatorRecord, Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
@@ -44,6 +45,7 @@ def diagnose(
     settings: DiagnosisSettings | None = None,
     log: Callable[[str], None] = _silent,
     others: Sequence[Record] = (),
+    constraints: Sequence[Constraint] = (),
 ) -> Diagnosis:
     """Fit ``base`` to ``records``, find what it lacks, and put that in.
 
@@ -52,7 +54,8 @@ def diagnose(
     that the ``settings`` allow unless it is to be ``thorough``: that is counted in simulations, so
     the same records give the same answer on any machine. ``log`` receives a line on each choice.
     Of ``others``, records of the same sensor, only the readings at rest are used: they tell whether
-    its noise is slow, which one lead-in of 2 s often does not.
+    its noise is slow, which one lead-in of 2 s often does not. ``constraints`` are what is stated
+    of parameters, of springs and of effects that may be found; they hold in every fit.
     Raises ``ModelError`` for records and models that do not fit together.
     """
     settings = settings or DiagnosisSettings()
@@ -63,7 +66,7 @@ def diagnose(
 
     def searched(given: Sequence[Record], first: float) -> tuple[SearchResult, Search]:
         search = Search(
-            Fitter(given, base, settings, workers, others=others),
+            Fitter(given, base, settings, workers, others=others, constraints=constraints),
             lambda stage, fraction: progress(stage, first + part * fraction),
             stop,
             log,
@@ -122,7 +125,12 @@ def _may_be_held(found: SearchResult, search: Search, as_held: Sequence[Record])
         return False
     known = search.fitter
     fitter = Fitter(
-        as_held, found.baseline.model, search.settings, known.workers, others=known.others
+        as_held,
+        found.baseline.model,
+        search.settings,
+        known.workers,
+        others=known.others,
+        constraints=known.constraints,
     )
     fitter.read_noise(found.baseline.model)
     for left_out in (None, *best.effects):

@@ -16,6 +16,7 @@ from dearig.model.film.material import Network
 from dearig.model.fitting.identify import fit_globally
 from dearig.model.fitting.left_out import left_out
 from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.parameters import Constraint
 from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
@@ -50,12 +51,14 @@ def choose_springs(
     settings: DiagnosisSettings | None = None,
     workers: int = 2,
     progress: Callable[[str, float], None] = lambda *_: None,
+    constraints: Sequence[Constraint] = (),
 ) -> tuple[SpringTrial, ...]:
     """Return a trial of each of ``candidates`` that can follow ``records``, in their order.
 
     Candidates are models whose structure counts: kinds of springs, number of branches. The same
-    prior, the same noise and the same number of independent samples hold for all. Raises
-    ``ModelError`` where none can follow the records.
+    prior, the same noise and the same number of independent samples hold for all, and the same
+    ``constraints``, where a candidate has the parameter. Raises ``ModelError`` where none can
+    follow the records.
     """
     settings = settings or DiagnosisSettings()
     fits: list[Fit] = []
@@ -67,7 +70,7 @@ def choose_springs(
             progress("springs", (i + part) / len(candidates))
 
         try:
-            fitter = Fitter(records, candidate, settings, workers)
+            fitter = Fitter(records, candidate, settings, workers, constraints=constraints)
             fits.append(_with_free_shape(fitter, _beside(candidate, fits), report))
             kinds.append(candidate.network.equilibrium.kind)
         except ModelError as error:
@@ -125,6 +128,7 @@ def _with_free_shape(
     held = fitter.baseline(progress)
     problem = held.problem
     fixed = np.array([q.is_shape and q.index > 0 for q in problem.layout.quantities])
+    fixed |= problem.layout.fixed
     return fit_of(problem, fixed, descend(problem, held.x, fixed))
 
 

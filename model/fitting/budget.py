@@ -17,7 +17,13 @@ import numpy as np
 from dearig.model.errors import ModelError
 from dearig.model.fitting.identify import Identification, coarse_problem
 from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Contribution, Estimate, FitLayout, GivenValue
+from dearig.model.fitting.parameters import (
+    Constraint,
+    Contribution,
+    Estimate,
+    FitLayout,
+    GivenValue,
+)
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress
 from dearig.model.readings.records import ActuatorRecord, Record
@@ -44,7 +50,9 @@ def with_budget(
     if not isinstance(model, Actuator) or not given:
         return fitted
     held = np.isin(FitLayout(model).names, fitted.held_limits)
-    found = uncertainty_budget(records, model, held, given, workers, progress)
+    found = uncertainty_budget(
+        records, model, held, given, workers, progress, constraints=fitted.constraints
+    )
     return replace(fitted, estimates=with_systematic(fitted.estimates, found), budget=found)
 
 
@@ -56,16 +64,18 @@ def uncertainty_budget(
     workers: int = 2,
     progress: Progress = lambda *_: None,
     stop: Callable[[], bool] = lambda: False,
+    constraints: Sequence[Constraint] = (),
 ) -> tuple[Contribution, ...]:
     """Return what one standard uncertainty of each ``given`` value does to the parameters.
 
-    ``model`` is fitted to the ``records``, with its parameters ``held`` (d,) bool not fitted. A
+    ``model`` is fitted to the ``records``, with its parameters ``held`` (d,) bool not fitted, and
+    with ``constraints`` stated of parameters. A
     drift that it has is fitted to each record for itself. () where ``stop()`` is True before the
     end: a part of the contributions is no budget.
     """
-    problem = coarse_problem(Problem(records, FitLayout(model), workers))
+    problem = coarse_problem(Problem(records, FitLayout(model, constraints=constraints), workers))
     layout = problem.layout
-    held = held | problem.own
+    held = held | problem.own | layout.fixed
     start = descend(problem, layout.coordinates(layout.initial()), held, gain=_GAIN).x
     done, found = 0, []
     for one in given:
@@ -74,7 +84,7 @@ def uncertainty_budget(
             if stop():
                 return ()
             moved, changed = _moved(problem.records, model, one.name, sign * one.relative)
-            other = Problem(moved, FitLayout(changed), workers)
+            other = Problem(moved, FitLayout(changed, constraints=constraints), workers)
             x = descend(other, start, held, _ITERATIONS, _GAIN, damping=1e-4).x
             ends.append(layout.values(x))
             done += 1

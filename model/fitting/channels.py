@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from threading import Lock
 
@@ -502,10 +501,9 @@ class JointProblem(WhitenedProblem):
         """Number of readings that are fitted, those of the channels included."""
         return super().samples + self._more
 
-    @property
-    def readings_fitted(self) -> int:
-        """Number of readings of the displacement that are fitted."""
-        return super().samples
+    def of_channels(self, residuals: np.ndarray) -> np.ndarray:
+        """Return the part (M,) of ``residuals`` that belongs to the channels."""
+        return residuals[residuals.size - self._more :]
 
     def white(self) -> WhitenedProblem:
         """Return the displacement alone, under white noise alone."""
@@ -513,11 +511,10 @@ class JointProblem(WhitenedProblem):
 
     @staticmethod
     def alone(problem: WhitenedProblem) -> WhitenedProblem:
-        """Return ``problem`` without the channels' rows."""
-        if not isinstance(problem, JointProblem):
-            return problem
-        other = copy(problem)
-        other._channels, other._more = None, 0
+        """Return ``problem`` of the readings alone, without the rows of channels and priors."""
+        other = problem.without_priors()
+        if isinstance(other, JointProblem):
+            other._channels, other._more = None, 0
         return other
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
@@ -543,8 +540,7 @@ class JointProblem(WhitenedProblem):
         coarse: bool = False,
     ) -> np.ndarray:
         """Return d(residuals)/dx (N + M, f) over the ``free`` (d,) coordinates."""
-        own = None if residuals is None else residuals[: self.measured.size]
-        above = super().jacobian(x, free, own, coarse)
+        above = super().jacobian(x, free, residuals, coarse)
         up, down = self._sides(x, free, self.layout.differences(x))
         below = np.zeros((self._more, above.shape[1]))
         electric = np.array(
@@ -567,9 +563,5 @@ class JointProblem(WhitenedProblem):
         self, x: np.ndarray, residuals: np.ndarray, free: np.ndarray
     ) -> WhitenedProblem | None:
         """Return the problem under coarse drives, corrected to ``residuals`` at ``x``."""
-        found = super().space_mapped(x, residuals[: self.measured.size], free)
+        found = super().space_mapped(x, residuals, free)
         return found if isinstance(found, WhitenedProblem) else None
-
-    def coarse_residuals(self, x: np.ndarray, residuals: np.ndarray) -> np.ndarray | None:
-        """Return the displacement's residuals (N,) by coarse drives; None if not close."""
-        return super().coarse_residuals(x, residuals[: self.measured.size])

@@ -24,17 +24,23 @@ from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
 __all__ = [
     "AT_BOUND",
+    "AT_STATED_BOUND",
     "BY_CURVATURE",
     "MOVES_MAX",
     "BetterPoint",
     "Intervals",
     "at_bound",
+    "end_text",
     "estimates_with_intervals",
+    "fixed_estimate",
     "recentre",
 ]
 
 #: Note of a parameter at the end of its search range.
 AT_BOUND = "at the end of its search range"
+
+#: The same, where a person has stated that end.
+AT_STATED_BOUND = "at its stated bound"
 
 #: Note of an interval whose profile was not followed.
 BY_CURVATURE = "from the curvature at the optimum: the profile was not followed to its end"
@@ -42,6 +48,8 @@ BY_CURVATURE = "from the curvature at the optimum: the profile was not followed 
 #: Moves of an optimum to better points that profiles come to; what gains goes on.
 MOVES_MAX = 3
 
+_END_STATED = "the interval ends at a stated bound"
+_FIXED = "fixed"
 _J_WORDS = "no spring stiffens measurably at these stretches: only a lower bound"
 _AT_END = 1e-9  # of a coordinate: a descent clips to the bound itself
 
@@ -120,11 +128,19 @@ def estimates_with_intervals(
     # other valleys count as one more
     shares = layout.size + 1
     estimates = []
-    for place in (*np.flatnonzero(~bent), *np.flatnonzero(bent)):
+    # a better point, if there is one, shows first where the data fix least
+    for place in (*np.flatnonzero(bent), *np.flatnonzero(~bent)):
         j = int(place)
         q, value = layout.quantities[j], float(values[j])
+        if q.is_fixed:
+            estimates.append(fixed_estimate(q))
+            continue
         if held[j] and not (lower_ends and q.kind == "J"):
-            estimates.append(Estimate(q.name, q.unit, value, 0.0, math.inf, False, "held"))
+            estimates.append(
+                Estimate(
+                    q.name, q.unit, value, *q.open_ends, False, "held", constraint=q.constraint
+                )
+            )
             continue
         on = replace(best, problem=finer[0]) if finer is not None and bent[j] else best
         if held[j]:
@@ -171,7 +187,8 @@ def _about(
         gained = chi2 - fit.cost * problem.samples
         if gained > enough:
             raise BetterPoint(fit.x, gained)
-    inflation = max(1.0, chi2 / problem.samples) * max(1.0, correlation_time(residuals))
+    apart = correlation_time(problem.of_readings(residuals))
+    inflation = max(1.0, chi2 / problem.samples) * max(1.0, apart)
     jac = problem.jacobian(x, ~held)
     best = Optimum(problem, x, held, chi2, inflation, enough)
     return best, covariance(jac.T @ jac, inflation), jac
@@ -207,10 +224,23 @@ def _estimate(
     if held:
         note = _J_WORDS if low > 0.0 else "not determined by these data"
     elif at_end:
-        note = AT_BOUND
+        note = end_text(q, value)
     elif not followed:
         note = f"{note}; {BY_CURVATURE}" if note else BY_CURVATURE
-    return Estimate(q.name, q.unit, value, low, high, determined, note, at_bound=at_end)
+    stated = q.constraint
+    if stated is not None and not at_end and (low == stated.low or high == stated.high):
+        note = f"{note}; {_END_STATED}" if note else _END_STATED
+    return Estimate(
+        q.name, q.unit, value, low, high, determined, note, at_bound=at_end, constraint=stated
+    )
+
+
+def fixed_estimate(q: FreeParameter) -> Estimate:
+    """Return the estimate of a fixed parameter: its value, without an interval."""
+    value = q.bounds[0]
+    return Estimate(
+        q.name, q.unit, value, value, value, True, _FIXED, free=False, constraint=q.constraint
+    )
 
 
 def _by_curvature(
@@ -225,9 +255,19 @@ def _by_curvature(
 
 
 def at_bound(layout: FitLayout, x: np.ndarray) -> np.ndarray:
-    """Return which coordinates ``x`` (d,) are at an end of their search range, (d,) bool."""
+    """Return which coordinates ``x`` (d,) are at an end of their search range, (d,) bool.
+
+    A fixed parameter has no range.
+    """
     room = np.minimum(x - layout.lower, layout.upper - x)
-    return np.asarray(room <= _AT_END * (1.0 + np.abs(x)))
+    return np.asarray((room <= _AT_END * (1.0 + np.abs(x))) & ~layout.fixed)
+
+
+def end_text(q: FreeParameter, value: float) -> str:
+    """Return the note of a ``value`` at an end of its range."""
+    ends = () if q.constraint is None else (q.constraint.low, q.constraint.high)
+    stated = any(end is not None and math.isclose(value, end, rel_tol=1e-6) for end in ends)
+    return AT_STATED_BOUND if stated else AT_BOUND
 
 
 def _open_text(low: float, high: float) -> str:

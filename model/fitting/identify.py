@@ -8,22 +8,36 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from dearig.model import kernel
 from dearig.model.errors import ModelError
 from dearig.model.film.material import Network
 from dearig.model.fitting.estimates import (
-    AT_BOUND,
     MOVES_MAX,
     BetterPoint,
     Intervals,
     at_bound,
+    end_text,
     estimates_with_intervals,
+    fixed_estimate,
     recentre,
 )
-from dearig.model.fitting.intervals import CHI2_95, correlation_time, firm_directions, linear_widths
+from dearig.model.fitting.intervals import (
+    CHI2_95,
+    correlation_time,
+    covariance,
+    firm_directions,
+    linear_widths,
+)
 from dearig.model.fitting.levenberg import LocalFit, descend, gain_that_counts
-from dearig.model.fitting.parameters import Contribution, Estimate, FitLayout, require_free
+from dearig.model.fitting.parameters import (
+    Constraint,
+    Contribution,
+    Estimate,
+    FitLayout,
+    require_free,
+)
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.rejection import misfit_p
 from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
@@ -52,10 +66,14 @@ _POPULATIONS = 20.0  # simulated until a descent counts as half done
 _COARSE_SAMPLES = 1500  # of a film record
 _MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
+_GAIN_LEFT = 0.1  # of the gain that counts: where a fit ends that is reported
+_RESOLVED = 0.2  # of a mean's interval: the shortest relaxation time of a search on means
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
 # Of an interval's width, which means and quicker steps may change: it changes a coverage of 95 %
 # by a quarter of a per cent
 _WIDTH_ERROR_MAX = 0.01
+# Of a prior's variance, by which the data must narrow it to say anything of it
+_PRIOR_TOLD = 1e-6
 # Hz and fidelity of the means for the intervals, the cheapest first
 _LEVELS = (
     (0.5 * _COARSE_RATE, kernel.COARSE),
@@ -77,7 +95,10 @@ class Identification:
     locking limits that were held because the data do not determine them. ``warnings`` are sentences
     for the operator. ``misfit_p`` is the probability that noise as that at rest leaves the residual
     of the training records, None where their rest does not tell. ``budget`` are the contributions
-    of given values to the uncertainty (``dearig.model.fitting.budget``).
+    of given values to the uncertainty (``dearig.model.fitting.budget``). ``constraints`` are what
+    was stated of parameters, ``prior_chi2`` the chi-square of their priors, which ``cost`` leaves
+    out, and ``prior_p`` the probability that priors are as far from what the data say (None
+    without).
     """
 
     method: str
@@ -94,6 +115,9 @@ class Identification:
     budget: tuple[Contribution, ...] = ()
     sums: tuple[Estimate, ...] = ()
     misfit_p: float | None = None
+    constraints: tuple[Constraint, ...] = ()
+    prior_chi2: float = 0.0
+    prior_p: float | None = None
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -114,8 +138,11 @@ def identify(
     nested: Network | None = None,
     workers: int = 2,
     progress: Progress = _quiet,
+    constraints: Sequence[Constraint] = (),
 ) -> Identification:
     """Fit ``base`` to ``records``: all its moduli, locking limits and relaxation times are free.
+
+    But for ``constraints``: what is stated of parameters before the fit.
 
     ``base`` is an ``Actuator`` for records driven by voltage (its film and load are kept), a
     ``Strip`` for films driven by stretch. The values of its springs are not used as a start, only
@@ -126,15 +153,18 @@ def identify(
     """
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
-    layout = FitLayout(base)
+    layout = FitLayout(base, constraints=constraints)
+    if method == "de" and layout.priors.size:
+        raise ModelError("Algorithm 1 as printed weighs no residual, and so takes no prior")
     # the algorithm as printed takes the zero of displacement for exact
     problem = Problem(records, layout, workers, exact_zero=method == "de")
     require_free(layout, problem.samples)
     if method == "de":
         found = algorithm_1(problem, seed, progress)
-        fit = descend(problem, layout.coordinates(found), iterations=0)
+        fit = descend(problem, layout.coordinates(found), layout.fixed, iterations=0)
         return _result(problem, method, fit, found, "Algorithm 1 gives no interval", ())
     fit, held_limits = fit_globally(problem, nested, progress)
+    held_limits = held_limits & ~layout.fixed
     limits = tuple(n for n, h in zip(layout.names, held_limits, strict=True) if h)
     words = "no interval was asked for"
     result = _result(problem, method, fit, layout.values(fit.x), words, limits)
@@ -151,9 +181,9 @@ def add_intervals(
 
     Where a profile comes to a better point, the fit moves there, and the intervals are about that.
     """
-    layout = FitLayout(fitted.model)
+    layout = FitLayout(fitted.model, constraints=fitted.constraints)
     problem = Problem(records, layout, workers)
-    held = np.array([name in fitted.held_limits for name in layout.names])
+    held = layout.fixed | np.isin(layout.names, fitted.held_limits)
     simulations = fitted.simulations
     found: Intervals | None = None
     gain: float | None = None
@@ -161,12 +191,19 @@ def add_intervals(
         try:
             found = _intervals(problem, layout.initial(), held, progress, gain)
         except BetterPoint as better:
-            fit = descend(problem, better.x, held, damping=1e-4)
-            if fit.cost < fitted.cost:
+            x = better.x
+            if isinstance(layout.base, Actuator):
+                means = coarse_problem(problem, corrected=True)
+                x = _descend_on_means(problem, means, x, held)
+                simulations += means.simulations
+            fit = descend(problem, x, held, damping=1e-4)
+            here = problem.costs(layout.coordinates(layout.initial())[None])[0]
+            if fit.cost < here:
                 fitted = _result(
                     problem, fitted.method, fit, layout.values(fit.x), "", fitted.held_limits
                 )
-                layout = problem.layout = FitLayout(fitted.model)
+                layout = FitLayout(fitted.model, constraints=fitted.constraints)
+                problem.layout = layout
             else:
                 # so much is an error of the means
                 gain = better.gained
@@ -179,7 +216,7 @@ def add_intervals(
         warnings = (*warnings, sums_text(found.sums))
     return replace(
         fitted,
-        estimates=(*(e for e in fitted.estimates if not e.free), *found.estimates),
+        estimates=(*(e for e in fitted.estimates if not (e.free or e.is_fixed)), *found.estimates),
         sums=found.sums,
         covariance_names=found.names,
         covariance=found.covariance,
@@ -202,9 +239,11 @@ def _result(
     model = layout.model(values)
     base = layout.base
     estimates = [
-        Estimate(
-            q.name, q.unit, float(v), 0.0, math.inf, False, AT_BOUND if end else words,
-            at_bound=bool(end),
+        fixed_estimate(q)
+        if q.is_fixed
+        else Estimate(
+            q.name, q.unit, float(v), 0.0, math.inf, False,
+            end_text(q, float(v)) if end else words, at_bound=bool(end), constraint=q.constraint,
         )
         for q, v, end in zip(
             layout.quantities, values, at_bound(layout, layout.coordinates(values)), strict=True
@@ -219,24 +258,31 @@ def _result(
                 "follows from the measured rest length and the weight", free=False,
             ),
         )  # fmt: skip
-    correlation = correlation_time(fit.residuals)
+    left, rows = np.split(fit.residuals, [problem.measured.size])
+    cost = float(left @ left) / problem.readings_fitted
+    prior_p = _prior_p(problem, fit, held_limits)
     warnings = []
-    p = _misfit_p(problem, fit.residuals)
+    p = _misfit_p(problem, left)
     if p is not None and is_rejected(p):
         warnings.append(
             f"the model is rejected: noise as that at rest leaves such a residual with "
             f"{p_text(p)}; the intervals hold only if the model were right; run a diagnosis"
         )
-    elif fit.cost > _MISFIT and p is None and method == "hybrid":
+    elif cost > _MISFIT and p is None and method == "hybrid":
         warnings.append(
             "the residual is above the noise: the model lacks something, and the intervals "
             "(widened by the residual's size and correlation) are a rough guide"
         )
     warnings += [
-        f"{e.name} is {AT_BOUND}: the data may ask for a value beyond it"
-        for e in estimates
+        f"{e.name} is {end_text(q, e.value)}: the data may ask for a value beyond it"
+        for q, e in zip(layout.quantities, estimates[-layout.size :], strict=True)
         if e.at_bound
     ]
+    if prior_p is not None and is_rejected(prior_p):
+        warnings.append(
+            f"the priors contradict the data ({p_text(prior_p)}); farthest from its prior is "
+            f"{_farthest(layout, rows)}"
+        )
     if method == "hybrid" and not fit.converged:
         warnings.append("the fit stopped before it converged")
     return Identification(
@@ -246,12 +292,50 @@ def _result(
         covariance_names=(),
         covariance=np.empty((0, 0)),
         held_limits=held_limits,
-        cost=fit.cost,
-        correlation=correlation,
+        cost=cost,
+        correlation=correlation_time(left),
         simulations=problem.simulations,
         converged=fit.converged,
         warnings=tuple(warnings),
         misfit_p=p,
+        constraints=layout.constraints,
+        prior_chi2=float(rows @ rows),
+        prior_p=prior_p,
+    )
+
+
+def _prior_p(problem: Problem, fit: LocalFit, held_limits: Sequence[str]) -> float | None:
+    """Return the probability that priors are as far from what the data alone say as here.
+
+    None without priors. To first order the distances of the fit from the prior means have the
+    covariance S - C, where S is that of the priors and C that of the fit: what the data say has the
+    covariance that C^-1 - S^-1 gives, and its distance from the means has that plus S.
+    """
+    layout = problem.layout
+    places = layout.priors
+    if not places.size:
+        return None
+    held = layout.fixed | np.isin(layout.names, held_limits)
+    jac = problem.jacobian(fit.x, ~held)
+    left, rows = np.split(fit.residuals, [problem.measured.size])
+    inflation = max(1.0, float(left @ left) / problem.readings_fitted) * max(
+        1.0, correlation_time(left)
+    )
+    below = jac[left.size :]
+    # of rows, which are in standard deviations of their priors
+    weighed = np.vstack([jac[: left.size] / math.sqrt(inflation), below])
+    rest = np.eye(places.size) - below @ covariance(weighed.T @ weighed, 1.0) @ below.T
+    size, axes = np.linalg.eigh(rest)
+    told = size > _PRIOR_TOLD
+    far = (axes.T @ rows)[told] ** 2 / size[told]
+    return float(chi2.sf(float(far.sum()), int(told.sum()))) if told.any() else 1.0
+
+
+def _farthest(layout: FitLayout, rows: np.ndarray) -> str:
+    """Return the parameter that is farthest from its prior, and by how much."""
+    most = int(np.argmax(np.abs(rows)))
+    return (
+        f"{layout.names[layout.priors[most]]}, by {abs(rows[most]):.2g} of its standard deviations"
     )
 
 
@@ -322,6 +406,7 @@ def fit_globally(
     limits = layout.shapes
     driven_by_voltage = isinstance(layout.base, Actuator)
     first = limits if driven_by_voltage or not stiffening else np.zeros_like(limits)
+    first = first | layout.fixed
     progress("global search", 0.0)
     coarse = coarse_problem(problem, corrected=driven_by_voltage)
     starts = (
@@ -341,32 +426,52 @@ def fit_globally(
             counted(count, cost)
 
     problem.on_simulations = on_all_readings
+    scouts = _of_resolved_times(coarse) if driven_by_voltage else coarse
     fits = []
     for start in starts:
-        fits.append(descend(coarse, start, first, iterations=_SCOUT_ITERATIONS))
+        fits.append(descend(scouts, start, first, iterations=_SCOUT_ITERATIONS))
         descents.ended()
     # two, because the best after a few steps is not always the best at the end
     leaders = sorted(fits, key=lambda f: f.cost)[:2]
     ends = []
     for leader in leaders:
-        ends.append(descend(coarse, leader.x, first))
+        ends.append(descend(scouts, leader.x, first))
         descents.ended()
     x = min(ends, key=lambda f: f.cost).x
     if driven_by_voltage:
         x = _descend_on_means(problem, coarse, x, first)
         descents.ended()
-        if limits.any():
+        freeable = int(np.count_nonzero(limits & ~layout.fixed))
+        if freeable:
             # means that agree with all readings: what means add does not look like a limit
-            freed = descend(coarse, x, iterations=20)
-            if is_worth_freeing(coarse, float(coarse.costs(x[None])[0]), freed, int(limits.sum())):
-                first = np.zeros_like(limits)
+            freed = descend(coarse, x, layout.fixed, iterations=20)
+            if is_worth_freeing(coarse, float(coarse.costs(x[None])[0]), freed, freeable):
+                first = layout.fixed
                 x = _descend_on_means(problem, coarse, freed.x, first)
     descents.ended()
-    fit = descend(problem, x, first, damping=1e-4)
+    fit = descend(problem, x, first, gain=_little_gain(problem, x), damping=1e-4)
     problem.on_simulations = counted
     progress("descents", 1.0)
     problem.simulations += coarse.simulations
+    if scouts is not coarse:
+        problem.simulations += scouts.simulations
     return fit, first
+
+
+def _of_resolved_times(means: Problem) -> Problem:
+    """Return the problem on ``means`` without relaxation times that they do not resolve.
+
+    To means a branch so fast is a drag, with any time; and it makes the film stiff.
+    """
+    layout = copy(means.layout)
+    layout.lower = layout.lower.copy()
+    step = min(float(np.median(np.diff(r.time))) for r in means.records)
+    times = layout.column("T")
+    least = np.maximum(layout.lower[times], math.log(_RESOLVED * step))
+    layout.lower[times] = np.minimum(least, layout.upper[times])
+    found = copy(means)
+    found.layout = layout
+    return found
 
 
 def _descend_on_means(
@@ -381,7 +486,7 @@ def _descend_on_means(
     x, cost = start, float(problem.costs(start[None])[0])
     for _ in range(_CORRECTIONS_MAX):
         recentre(means, problem, problem.layout.values(x))
-        moved = descend(means, x, held, damping=1e-4).x
+        moved = descend(means, x, held, gain=_little_gain(problem, x), damping=1e-4).x
         reached = float(problem.costs(moved[None])[0])
         gained = (cost - reached) * problem.samples
         if gained > 0.0:
@@ -391,12 +496,19 @@ def _descend_on_means(
     return x
 
 
+def _little_gain(problem: Problem, x: np.ndarray) -> float:
+    """Return the gain in chi-square of ``problem`` near ``x`` (d,) that ends the last descents."""
+    chi2 = float(problem.costs(x[None])[0]) * problem.samples
+    return _GAIN_LEFT * gain_that_counts(chi2, problem.samples)
+
+
 def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: int) -> bool:
     """Whether ``freed``, with so many more parameters, is significantly better than ``cost``.
 
     Correlated residuals count as fewer independent readings.
     """
-    inflation = max(1.0, freed.cost) * max(1.0, correlation_time(freed.residuals))
+    left = problem.of_readings(freed.residuals)
+    inflation = max(1.0, freed.cost) * max(1.0, correlation_time(left))
     return (cost - freed.cost) * problem.samples / inflation > CHI2_95 * numbers
 
 

@@ -33,6 +33,7 @@ from dearig.model.springs import SPRING_LAWS, SPRINGS, ShapeParameter, locking_s
 __all__ = [
     "NORMAL_95",
     "THESIS_RANGES",
+    "Constraint",
     "Contribution",
     "Estimate",
     "FitLayout",
@@ -57,12 +58,57 @@ _PERMITTIVITY_RANGE = (1.0, 100.0)  # relative: of vacuum, and above that of any
 
 
 @dataclass(frozen=True)
+class Constraint:
+    """What is stated of the parameter ``name`` before a fit, in SI units; None where nothing is.
+
+    The parameter is ``fixed`` at a value, or fitted between ``low`` and ``high``, with a Gaussian
+    prior of that ``mean`` and standard deviation ``sd``. Raises ``ModelError`` for statements that
+    contradict each other.
+    """
+
+    name: str
+    fixed: float | None = None
+    low: float | None = None
+    high: float | None = None
+    mean: float | None = None
+    sd: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be meant."""
+        numbers = (self.fixed, self.low, self.high, self.mean, self.sd)
+        if not all(math.isfinite(n) for n in numbers if n is not None):
+            raise ModelError("a value is not a finite number")
+        if all(n is None for n in numbers):
+            raise ModelError("nothing is stated of it")
+        if self.fixed is not None and any(n is not None for n in numbers[1:]):
+            raise ModelError("it is fixed, so it has neither bounds nor a prior")
+        if self.low is not None and self.high is not None and self.low >= self.high:
+            raise ModelError("its lower bound is not below its upper bound")
+        if (self.mean is None) != (self.sd is None):
+            raise ModelError("a prior has a mean and a standard deviation")
+        if self.sd is not None and self.sd <= 0.0:
+            raise ModelError("the standard deviation of its prior is not above 0")
+        if self.mean is not None and not self.allows(self.mean):
+            raise ModelError("the mean of its prior is outside of its bounds")
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether an end of its range is stated."""
+        return self.low is not None or self.high is not None
+
+    def allows(self, value: float) -> bool:
+        """Whether ``value`` is within the bounds."""
+        return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
+
+
+@dataclass(frozen=True)
 class FreeParameter:
     """One free parameter.
 
     ``kind`` is mu, J, T or ``shape`` of spring ``index`` (0 is the equilibrium spring),
     ``permittivity``, or ``effect``: then it is parameter ``index`` of the effect ``effect``. J and
-    ``shape`` are parameter ``place`` of the strain energy ``law``.
+    ``shape`` are parameter ``place`` of the strain energy ``law``. ``constraint`` is what is stated
+    of it. Raises ``ModelError`` where that is outside of what a fit allows.
     """
 
     kind: str
@@ -70,6 +116,20 @@ class FreeParameter:
     effect: str = ""
     law: str = ""
     place: int = 0
+    constraint: Constraint | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a constraint that no fit can meet."""
+        stated = self.constraint
+        if stated is None:
+            return
+        least, most = self.search_range
+        inside = [v for v in (stated.fixed, stated.low, stated.high, stated.mean) if v is not None]
+        if any(not least <= v <= most for v in inside):
+            raise ModelError(
+                f"{self.name} is stated outside of what a fit allows, {least:g} to {most:g} "
+                f"{self.unit}".rstrip()
+            )
 
     @property
     def parameter(self) -> Parameter | ShapeParameter:
@@ -102,13 +162,51 @@ class FreeParameter:
         return {"mu": "Pa", "T": "s"}.get(self.kind, "")
 
     @property
-    def bounds(self) -> tuple[float, float]:
-        """Search range."""
+    def search_range(self) -> tuple[float, float]:
+        """Range of a fit where nothing is stated."""
         if self.kind in ("effect", "J", "shape"):
             return self.parameter.fit_bounds
         if self.kind == "permittivity":
             return _PERMITTIVITY_RANGE
         return _FLOOR[self.kind], THESIS_RANGES[self.kind][1]
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Range of a fit; both ends are the value of a fixed parameter."""
+        return self.within(self.search_range)
+
+    def within(self, span: tuple[float, float]) -> tuple[float, float]:
+        """Return the stated bounds, and the ends of ``span`` where none are stated.
+
+        Where the stated bounds are outside of ``span``, the range of a fit is in its place.
+        """
+        stated = self.constraint
+        if stated is None:
+            return span
+        if stated.fixed is not None:
+            return stated.fixed, stated.fixed
+        low = span[0] if stated.low is None else stated.low
+        high = span[1] if stated.high is None else stated.high
+        if low < high:
+            return low, high
+        least, most = self.search_range
+        return (least, high) if stated.low is None else (low, most)
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it is stated, not fitted."""
+        return self.constraint is not None and self.constraint.fixed is not None
+
+    @property
+    def open_ends(self) -> tuple[float, float]:
+        """Ends of an interval that the data leave open: the stated bounds, or those of the law."""
+        low, high = self.search_range if self.kind == "effect" else (0.0, math.inf)
+        stated = self.constraint
+        if stated is None:
+            return low, high
+        return low if stated.low is None else stated.low, (
+            high if stated.high is None else stated.high
+        )
 
     @property
     def logarithmic(self) -> bool:
@@ -144,7 +242,8 @@ class Estimate:
     ``free`` is False for a parameter that follows from others (mu_0 of a measured rest length).
     ``at_bound`` is True for a value at an end of its search range: the data may ask for more.
     ``systematic`` is its standard uncertainty by those of the film, the load and the scalings, 0
-    where none are known; ``low`` and ``high`` do not contain it.
+    where none are known; ``low`` and ``high`` do not contain it. ``constraint`` is what was stated
+    of it before the fit; a fixed one is not ``free``, and both ends are its value.
     """
 
     name: str
@@ -157,6 +256,12 @@ class Estimate:
     free: bool = True
     at_bound: bool = False
     systematic: float = 0.0
+    constraint: Constraint | None = None
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the value was stated, not fitted."""
+        return self.constraint is not None and self.constraint.fixed is not None
 
     @property
     def combined(self) -> tuple[float, float]:
@@ -201,6 +306,10 @@ class FitLayout:
     ``times`` narrows the range of the relaxation times, in s. With ``permittivity`` the relative
     permittivity of an actuator's film is free too; a fit of one record hardly tells it from a
     common factor of all moduli.
+
+    ``constraints`` are what is stated of parameters; those of parameters that the model lacks have
+    no part. A fixed parameter has a coordinate, with both bounds at its value (``fixed``), so that
+    nothing moves it; fits leave it out. Stated bounds go before ``times``.
     """
 
     def __init__(
@@ -208,8 +317,10 @@ class FitLayout:
         base: Actuator | Strip,
         times: tuple[float, float] | None = None,
         permittivity: bool = False,
+        constraints: Sequence[Constraint] = (),
     ) -> None:
         self.base = base
+        self.constraints = tuple(constraints)
         self.network = base.network
         self.held = base.film.held if isinstance(base, Actuator) else base.held
         self._c = base.coefficients()
@@ -217,7 +328,7 @@ class FitLayout:
         if isinstance(base, Actuator) and base.load.rest_length is not None:
             self._rest = base.load.rest_length / base.film.length
         springs = self.network.springs
-        self.quantities: tuple[FreeParameter, ...] = (
+        quantities = (
             *(FreeParameter("mu", i) for i in range(len(springs)) if i or self._rest is None),
             *_shapes(springs),
             *(FreeParameter("T", i) for i in range(1, len(springs))),
@@ -228,12 +339,26 @@ class FitLayout:
                 for i in range(len(EFFECTS[name].parameters))
             ),
         )
+        stated = {c.name: c for c in constraints}
+        self.quantities: tuple[FreeParameter, ...] = tuple(
+            replace(q, constraint=stated.get(q.name)) for q in quantities
+        )
         self._columns = np.array([q.column for q in self.quantities])
         self._log = np.array([q.logarithmic for q in self.quantities])
         self._typical = np.array([q.typical for q in self.quantities])
-        bounds = np.array([q.bounds for q in self.quantities])
-        if times is not None:
-            bounds[self.column("T")] = times
+        bounds = np.array(
+            [
+                q.within(times) if times is not None and q.kind == "T" else q.bounds
+                for q in self.quantities
+            ]
+        )
+        #: (d,) bool: parameters that are stated, not fitted
+        self.fixed = np.array([q.is_fixed for q in self.quantities], dtype=bool)
+        self._stated = np.where(self.fixed, bounds[:, 0], 0.0)
+        priors = [(j, q.constraint) for j, q in enumerate(self.quantities) if q.constraint]
+        self._priors = [
+            (j, c.mean, c.sd) for j, c in priors if c.mean is not None and c.sd is not None
+        ]
         self.lower, self.upper = self.coordinates(bounds[:, 0]), self.coordinates(bounds[:, 1])
 
     @property
@@ -245,6 +370,16 @@ class FitLayout:
     def size(self) -> int:
         """Number of free parameters."""
         return len(self.quantities)
+
+    @property
+    def priors(self) -> np.ndarray:
+        """Indices of the parameters that have a prior, (k,)."""
+        return np.array([j for j, _, _ in self._priors], dtype=int)
+
+    def prior_rows(self, values: np.ndarray) -> np.ndarray:
+        """Return how far ``values`` (P, d) are from the priors, in standard deviations: (P, k)."""
+        rows = [(values[:, j] - mean) / sd for j, mean, sd in self._priors]
+        return np.array(rows).reshape(len(rows), values.shape[0]).T
 
     def column(self, kind: str) -> np.ndarray:
         """Indices of the free parameters of one kind."""
@@ -261,7 +396,9 @@ class FitLayout:
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """Return natural values (..., d) at coordinates ``x`` (..., d)."""
-        return np.where(self._log, np.exp(np.where(self._log, x, 0.0)), x)
+        found = np.where(self._log, np.exp(np.where(self._log, x, 0.0)), x)
+        # a logarithm and back may round
+        return np.where(self.fixed, self._stated, found)
 
     def reach(self, x: np.ndarray) -> np.ndarray:
         """Return the largest step (d,) from ``x`` in each coordinate for which linearity holds.
@@ -353,7 +490,11 @@ class FitLayout:
         for j in self.column("J"):
             k = HEAD + WIDTH * self.quantities[j].index
             kind = int(self._c[k + KIND])
-            c[:, k + LOCKING] = [locking_strain(kind, shape_at(row, k)) for row in c]
+            shape = c[:, k + LIMIT : k + SHAPE + 3]
+            alike = bool((shape == shape[0]).all())
+            c[:, k + LOCKING] = [
+                locking_strain(kind, shape_at(row, k)) for row in (c[:1] if alike else c)
+            ]
         if self._rest is not None:
             for row in c:
                 pull = nominal_pull(
@@ -396,7 +537,7 @@ class FitLayout:
         """Return ``values`` (d,) with the branches in order of relaxation time.
 
         Branches with the same kind of spring are interchangeable; a fixed order makes two fits of
-        the same data comparable.
+        the same data comparable. A branch of which something is stated keeps its number.
         """
         return values[self.order_by_relaxation_time(values)]
 
@@ -406,10 +547,12 @@ class FitLayout:
         kinds = {s.kind for s in self.network.springs[1:]}
         if len(kinds) > 1:
             return places
-        order = np.argsort(values[self.column("T")], kind="stable")
+        stated = {q.index for q in self.quantities if q.kind != "effect" and q.constraint}
+        times = [j for j in self.column("T") if self.quantities[j].index not in stated]
+        order = np.argsort(values[times], kind="stable")
         alike: dict[tuple[str, int], list[int]] = {}
         for j, q in enumerate(self.quantities):
-            if q.kind != "effect" and q.index > 0:
+            if q.kind != "effect" and q.index > 0 and q.index not in stated:
                 alike.setdefault((q.kind, q.place), []).append(j)
         for columns in alike.values():
             if len(columns) == len(order):

@@ -8,14 +8,20 @@ from itertools import combinations
 from math import comb, inf
 
 import numpy as np
-from scipy.optimize import OptimizeResult, differential_evolution, nnls
+from scipy.optimize import (
+    OptimizeResult,
+    differential_evolution,
+    linear_sum_assignment,
+    lsq_linear,
+    nnls,
+)
 
 from dearig.model import kernel
 from dearig.model.coefficients import ELECTRIC, MODULUS
 from dearig.model.errors import ModelError
 from dearig.model.film.material import Branch, Network, Spring
 from dearig.model.film.network import HEAD
-from dearig.model.fitting.parameters import THESIS_RANGES, FitLayout
+from dearig.model.fitting.parameters import THESIS_RANGES, FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
 from dearig.model.kinematics import electric_along
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
@@ -40,6 +46,9 @@ SMOOTHING = 0.015
 _WIDE_LIMIT = 1e4  # of J: a spring that does not stiffen within any stretch of an actuator
 _REST_ITERATIONS = 6
 _LEAST = {"mu": 1e-9, "J": 1e-9, "T": 1e-300}  # of Algorithm 1's values, natural
+_STATED_POINTS = 4  # of a range that is stated of a relaxation time
+_TIME_ERROR = 1e-9  # of the logarithm of a time: rounding
+_OUT = 1e6  # cost of a branch outside of its range, above any distance from a prior
 _SETS_MAX = 6000  # of branches, each tried by least squares: a third of a second
 
 
@@ -70,7 +79,7 @@ def algorithm_1(
     coordinates. Eq. 50's e_rms is in the displacement's own unit, taken as mm.
     """
     layout = problem.layout
-    bounds = np.array([THESIS_RANGES.get(q.kind, q.bounds) for q in layout.quantities])
+    bounds = np.array([q.within(THESIS_RANGES.get(q.kind, q.bounds)) for q in layout.quantities])
     rng = np.random.default_rng(seed)
     members = rng.uniform(bounds[:, 0], bounds[:, 1], (settings.members, layout.size))
     # the open ends of the ranges: a modulus or a limit of exactly 0 is no spring
@@ -144,8 +153,14 @@ def _start_values(layout: FitLayout) -> np.ndarray:
 
 
 def _wide(layout: FitLayout) -> tuple[float, ...]:
-    """Return the values at which the equilibrium spring does not stiffen."""
-    return _shape_values(layout.network.equilibrium.kind, _WIDE_LIMIT)
+    """Return the values at which the equilibrium spring does not stiffen, in bounds."""
+    return _in_bounds(layout, _shape_values(layout.network.equilibrium.kind, _WIDE_LIMIT))
+
+
+def _in_bounds(layout: FitLayout, first: tuple[float, ...]) -> tuple[float, ...]:
+    """Return values ``first`` of the equilibrium spring's law, within what is stated of them."""
+    own = {q.place: q.bounds for q in layout.quantities if q.is_shape and q.index == 0}
+    return tuple(float(np.clip(v, *own.get(place, (v, v)))) for place, v in enumerate(first))
 
 
 def _shape_values(kind: str, limit: float) -> tuple[float, ...]:
@@ -177,7 +192,7 @@ def _at_rest_balance(
         moduli, _ = nnls(parts.T, target)
         if moduli[0] <= 0.0:
             break
-        c[HEAD + MODULUS] = moduli[0]
+        c[HEAD + MODULUS] = np.clip(moduli[0], *_modulus_ranges(layout)[0])
         status, solved = kernel.rest_stretch(c, 0.0)
         if status != kernel.OK or abs(solved - rest) < 1e-6:
             break
@@ -225,7 +240,12 @@ def film_starts(
     layout = problem.layout
     records = [r for r in problem.records if isinstance(r, FilmRecord)]
     greatest = max(float(np.max(r.stretch)) for r in records)
-    firsts = SPRING_LAWS[layout.network.equilibrium.kind].starts(greatest**2)
+    firsts = tuple(
+        dict.fromkeys(
+            _in_bounds(layout, first)
+            for first in SPRING_LAWS[layout.network.equilibrium.kind].starts(greatest**2)
+        )
+    )
     if not stiffening:
         firsts = (_wide(layout),)
     # a branch with a low limit flows at a nearly constant stress at any rate
@@ -263,14 +283,71 @@ def resolved_times(records: Sequence[Record]) -> tuple[float, float]:
 
 
 def _time_grid(problem: Problem, points: int = 16) -> np.ndarray:
-    """Return relaxation times that records resolve, in bounds."""
+    """Return relaxation times that records resolve, in bounds, and those that are stated."""
     layout = problem.layout
     first, last = resolved_times(problem.records)
     times = layout.column("T")
     if times.size:
         low, high = np.exp(layout.lower[times].min()), np.exp(layout.upper[times].max())
         first, last = np.clip([first, last], low, high)
-    return np.geomspace(first, last, points)
+    stated = [_stated_times(layout.quantities[j], first, last) for j in times]
+    return np.unique(np.concatenate([np.geomspace(first, last, points), *stated]))
+
+
+def _stated_times(q: FreeParameter, first: float, last: float) -> np.ndarray:
+    """Return times at which a branch may be by what is stated of its time ``q``."""
+    stated = q.constraint
+    if stated is None:
+        return np.zeros(0)
+    low, high = q.within((first, last))
+    points = list(np.geomspace(low, high, 1 if q.is_fixed else _STATED_POINTS))
+    if stated.mean is not None:
+        points.append(float(np.clip(stated.mean, low, high)))
+    return np.array(points)
+
+
+def _modulus_ranges(layout: FitLayout) -> np.ndarray:
+    """Return the ranges in Pa of the moduli of all springs, (1 + branches, 2), from 0 on."""
+    found = np.tile([0.0, inf], (len(layout.network.springs), 1))
+    for j in layout.column("mu"):
+        q = layout.quantities[j]
+        if q.constraint is not None:
+            found[q.index] = q.within((0.0, inf))
+    return found
+
+
+def _fitted_moduli(
+    parts: np.ndarray, target: np.ndarray, ranges: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return the moduli (n,) within ``ranges`` (n, 2) of least squares, and their misfit."""
+    if not ranges[:, 0].any() and np.isinf(ranges[:, 1]).all():
+        return nnls(parts, target)
+    low, high = ranges.T
+    moduli, free = low.copy(), low < high
+    if free.any():
+        left = target - parts[:, ~free] @ moduli[~free]
+        moduli[free] = lsq_linear(parts[:, free], left, (low[free], high[free]), method="bvls").x
+    return moduli, float(np.linalg.norm(parts @ moduli - target))
+
+
+def _slots(layout: FitLayout, times: np.ndarray) -> np.ndarray | None:
+    """Return which of ``times`` (n,) each of the n branches takes, by what is stated of theirs.
+
+    None where it may not take them.
+    """
+    places = layout.column("T")
+    quantities = [layout.quantities[j] for j in places]
+    if not any(q.constraint for q in quantities):
+        return np.arange(times.size)
+    x = np.log(times)
+    beyond = np.maximum(layout.lower[places, None] - x, 0.0)
+    beyond += np.maximum(x - layout.upper[places, None], 0.0)
+    away = np.zeros_like(beyond)
+    for row, q in enumerate(quantities):
+        if q.constraint is not None and q.constraint.mean is not None:
+            away[row] = np.abs(x - np.log(np.maximum(q.constraint.mean, 1e-300)))
+    _, taken = linear_sum_assignment(_OUT * (beyond > _TIME_ERROR) + away)
+    return taken if not (beyond[np.arange(x.size), taken] > _TIME_ERROR).any() else None
 
 
 def _unit_stresses(
@@ -317,12 +394,17 @@ def _subsets(
         keep = branches
         while comb(keep + 1, branches) <= _SETS_MAX:
             keep += 1
-        pool = sorted(order[:keep])
+        pool = sorted({*order[:keep], *_stated_candidates(layout, candidates)})
     mu, times = layout.column("mu"), layout.column("T")
+    ranges = _modulus_ranges(layout)
     found = []
-    for chosen in combinations(pool, branches):
+    for some in combinations(pool, branches):
+        taken = _slots(layout, candidates[list(some), 0])
+        if taken is None:
+            continue
+        chosen = [some[i] for i in taken]
         columns = [0, *(1 + i for i in chosen)]
-        moduli, misfit = nnls(triangle[:, columns], triangle[:, -1])
+        moduli, misfit = _fitted_moduli(triangle[:, columns], triangle[:, -1], ranges)
         # a branch of zero weight still needs influence for the descent to move it
         moduli = np.maximum(moduli, 1e-3 * max(float(moduli.max()), 1.0))
         values = layout.initial()
@@ -333,9 +415,18 @@ def _subsets(
                 own = _shape_values(q.law, float(candidates[chosen[q.index - 1], 1]))
             values[j] = own[q.place]
         values[mu] = moduli[[layout.quantities[j].index for j in mu]]
-        values[times] = candidates[list(chosen), 0]
+        values[times] = candidates[chosen, 0]
         found.append((misfit, layout.coordinates(values)))
     return found
+
+
+def _stated_candidates(layout: FitLayout, candidates: np.ndarray) -> list[int]:
+    """Return the ``candidates`` (G, 2) with a time at which something stated wants a branch."""
+    stated = [
+        _stated_times(layout.quantities[j], *np.exp([layout.lower[j], layout.upper[j]]))
+        for j in layout.column("T")
+    ]
+    return [int(i) for i in np.flatnonzero(np.isin(candidates[:, 0], np.concatenate(stated)))]
 
 
 def _ranked(layout: FitLayout, found: list[tuple[float, np.ndarray]], starts: int) -> np.ndarray:

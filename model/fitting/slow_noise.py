@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from copy import copy
 from itertools import pairwise
 
 import numpy as np
@@ -243,10 +242,9 @@ class WhitenedProblem(Problem):
         predicted, status = super().predict(values, coarse)
         return self._whitened(predicted), status
 
-    def predict_neighbours(self, values: np.ndarray, coarse: bool = False) -> np.ndarray | None:
-        """Return whitened readings (P, N), as of ``Problem``."""
-        predicted = super().predict_neighbours(values, coarse)
-        return None if predicted is None else self._whitened(predicted)
+    def _differences_compared(self, rows: np.ndarray) -> np.ndarray:
+        rows = super()._differences_compared(rows)
+        return rows if self.noise_drift is None else self.noise_drift.whitened(rows)
 
     def _whitened(self, predicted: np.ndarray) -> np.ndarray:
         if self.noise_drift is None:
@@ -257,10 +255,14 @@ class WhitenedProblem(Problem):
         return self.noise_drift.whitened(predicted - self._correction) + self._correction
 
     def white(self) -> WhitenedProblem:
-        """Return the same problem under white noise alone."""
-        other = copy(self)
+        """Return the same problem of the readings alone, under white noise alone."""
+        other = self.without_priors()
         other.noise_drift, other.measured = None, other.readings
         return other
+
+    def of_channels(self, residuals: np.ndarray) -> np.ndarray:
+        """Return the part of ``residuals`` that belongs to electrical channels: none here."""
+        return residuals[residuals.size :]
 
     @property
     def edges(self) -> np.ndarray:

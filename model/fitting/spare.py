@@ -193,21 +193,22 @@ def _spare_and_firm(
     """Return the branches whose relaxation time ``estimates`` do not determine, and the others.
 
     Of two whose times may be equal, that is the one of the smaller modulus. A branch that may be
-    absent has no time.
+    absent has no time. One of which something is stated is known by that.
     """
     known = {e.name: e for e in estimates}
+    stated = {q.index for q in layout.quantities if q.kind != "effect" and q.constraint}
     branches = [
         q.index
         for q in layout.quantities
         if q.kind == "T" and {f"mu_{q.index}", q.name} <= {*known}
     ]
-    branches.sort(key=lambda b: -known[f"mu_{b}"].value)
+    branches.sort(key=lambda b: (b not in stated, -known[f"mu_{b}"].value))
     firm: list[int] = []
     for branch in branches:
         own = known[f"T_{branch}"]
         others = [known[f"T_{b}"] for b in firm]
         apart = all(own.low > other.high or other.low > own.high for other in others)
-        if own.determined and apart:
+        if branch in stated or (own.determined and apart):
             firm.append(branch)
     firm = firm or branches[:1]
     return tuple(sorted({*branches} - {*firm})), tuple(sorted(firm))
@@ -279,7 +280,8 @@ def widened(
                     ends = natural_ends(q, *at.profile(j, jacobian, tick))
                     spans[name] = _hull(spans[name], ends)
             for branch in found.firm:
-                if branch in found.parts:
+                total = layout.quantities[_columns(layout, branch)["mu", 0]].constraint
+                if branch in found.parts and (total is None or total.mean is not None):
                     ends = _of_sum(at, branch, found.beside(branch, sites), jacobian, tick)
                     sums[branch] = _hull(sums.get(branch, ends), ends)
     except end:
@@ -289,7 +291,7 @@ def widened(
     for e in estimates:
         j = layout.names.index(e.name)
         low, high = spans[e.name]
-        if j in parts and not held[j]:
+        if j in parts and not held[j] and e.constraint is None:
             # a part that is faster than the records show may be larger than any sum
             high = max(most, e.high) if layout.quantities[j].kind == "mu" else math.inf
             note = e.note if e.at_bound else SPARE
@@ -309,9 +311,9 @@ def _cells(found: Valleys, sites: Sequence[int]) -> FitLayout:
     for branch, site in (*zip(found.spare, sites, strict=True), *((b, b) for b in found.firm)):
         j, i = _time(cell, branch), [s for _, s in places].index(site)
         if i > 0:
-            cell.lower[j] = 0.5 * (times[i - 1] + times[i])
+            cell.lower[j] = max(cell.lower[j], 0.5 * (times[i - 1] + times[i]))
         if i + 1 < len(times):
-            cell.upper[j] = 0.5 * (times[i] + times[i + 1])
+            cell.upper[j] = min(cell.upper[j], 0.5 * (times[i] + times[i + 1]))
     return cell
 
 

@@ -195,9 +195,10 @@ def _groups(fit: Identification) -> dict[str, list[Estimate]]:
 _FITTED = "fitted, with 95 % interval"
 _BARE = "fitted, no interval"
 _FOLLOWS = "derived from other parameters"
+_FIXED = "fixed before the fit"
 _UNDETERMINED = "not determined by these data"
 _TABLE_3 = "thesis, Table 3"
-_PARAMETER_LABELS = (_FITTED, _BARE, _FOLLOWS, _UNDETERMINED, _TABLE_3)
+_PARAMETER_LABELS = (_FITTED, _BARE, _FOLLOWS, _FIXED, _UNDETERMINED, _TABLE_3)
 
 
 def _intervals(ax: Axes, label: str, estimates: Sequence[Estimate], fit: Identification) -> None:
@@ -223,7 +224,7 @@ def _intervals(ax: Axes, label: str, estimates: Sequence[Estimate], fit: Identif
         if e.free and known:
             _interval(ax, row, e.low * factor, e.high * factor, (left, right), colour)
         if not e.free:
-            marker, name = "s", _FOLLOWS
+            marker, name = "s", _FIXED if e.is_fixed else _FOLLOWS
         elif e.determined or not known:
             marker, name = "o", _FITTED if known else _BARE
         else:

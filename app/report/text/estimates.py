@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dearig.report.text.numbers import NO_VALUE, interval, quoted, symbol
+from dearig.report.text.numbers import NO_VALUE, quoted, symbol
 from dearig.report.text.tables import (
     BOUND_MARK,
     BRACKETS_TEXT,
@@ -14,6 +14,8 @@ from dearig.report.text.tables import (
     Table,
     budget_cells,
     budget_text,
+    stated_text,
+    within_text,
 )
 from dearig.units import parameter_unit
 
@@ -40,7 +42,7 @@ def effect_table(outcome: DiagnoseOutcome) -> Table:
         meanings = {p.name: p.meaning for p in EFFECTS[step.effect].parameters}
         for e in step.estimates:
             about = meanings.get(e.name.split(" in ")[0], "")  # may be a parameter of one recording
-            detail = "; ".join(w for w in (about, e.note) if w)
+            detail = "; ".join(w for w in (about, _note(e)) if w)
             name = f"{step.effect}: {e.name.replace('_', ' ')}"
             rows.append(_estimate(e, name, detail, bool(final.budget)))
     shown = [e for step in outcome.finding.steps for e in step.estimates]
@@ -51,7 +53,7 @@ def effect_table(outcome: DiagnoseOutcome) -> Table:
 def estimate_table(stage: Stage, rejected: bool = False) -> Table:
     """Return all parameters of a model, which the data may have ``rejected``."""
     rows = [
-        _estimate(e, symbol(e.name).replace("_", " "), e.note, bool(stage.budget))
+        _estimate(e, symbol(e.name).replace("_", " "), _note(e), bool(stage.budget))
         for e in (*stage.estimates, *stage.sums)
     ]
     return _estimates("Parameters", rows, stage.estimates, stage.budget, rejected)
@@ -79,11 +81,15 @@ def _estimates(
     return Table(title, tuple(head), tuple(rows), " ".join(notes))
 
 
+def _note(e: Estimate) -> str:
+    """Return the note of an estimate, with what was stated of it before the fit."""
+    return "; ".join(filter(None, ("" if e.is_fixed else e.note, stated_text(e))))
+
+
 def _estimate(e: Estimate, name: str, detail: str, with_budget: bool) -> Row:
     factor, unit = parameter_unit(e.unit)
-    low, high = e.low * factor, e.high * factor
     value = quoted(e.value * factor, *(end * factor for end in e.combined))
-    within = interval(low, high) if e.free else "derived"
+    within = within_text(e)
     if e.free and e.low == e.high == e.value:
         within = NO_VALUE
     if e.at_bound:

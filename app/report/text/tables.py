@@ -30,7 +30,9 @@ __all__ = [
     "error_table",
     "parameter_table",
     "spring_candidates",
+    "stated_text",
     "thesis_error_table",
+    "within_text",
 ]
 
 
@@ -201,6 +203,31 @@ def budget_text(budget: Sequence[Contribution]) -> str:
     )
 
 
+def stated_text(e: Estimate) -> str:
+    """Return what was stated of a parameter before the fit, but for a fixed value; else ""."""
+    stated, said = e.constraint, []
+    if stated is None:
+        return ""
+    factor, unit = parameter_unit(e.unit)
+    if stated.mean is not None and stated.sd is not None:
+        said.append(f"prior {stated.mean * factor:g} ± {stated.sd * factor:g} {unit}")
+    if stated.low is not None and stated.high is not None:
+        said.append(f"stated bounds {stated.low * factor:g} to {stated.high * factor:g} {unit}")
+    elif stated.low is not None:
+        said.append(f"stated lower bound {stated.low * factor:g} {unit}")
+    elif stated.high is not None:
+        said.append(f"stated upper bound {stated.high * factor:g} {unit}")
+    return "; ".join(text.rstrip() for text in said)
+
+
+def within_text(e: Estimate) -> str:
+    """Return the 95 % interval of a parameter; of one without, the reason."""
+    if e.is_fixed:
+        return "fixed"
+    factor, _ = parameter_unit(e.unit)
+    return interval(e.low * factor, e.high * factor) if e.free else "derived"
+
+
 def parameter_table(fit: Identification) -> Table:
     """Return every parameter with its 95 % interval, and the thesis's Table 3 if it applies."""
     published = table_3(fit.model)
@@ -212,11 +239,11 @@ def parameter_table(fit: Identification) -> Table:
             # only the digits that all uncertainties support
             low, high = e.combined
             value = quoted(e.value * factor, low * factor, high * factor)
-            within = interval(e.low * factor, e.high * factor) if e.free else "derived"
-            within = f"{within}{BOUND_MARK}" if e.at_bound else within
+            within = f"{within_text(e)}{BOUND_MARK}" if e.at_bound else within_text(e)
         else:
-            value = significant(e.value * factor, 4)
-            within = BOUND_MARK.lstrip(", ") if e.at_bound else NO_VALUE
+            value = significant(e.value * factor, 5 if e.is_fixed else 4)
+            within = within_text(e) if e.is_fixed else NO_VALUE
+            within = BOUND_MARK.lstrip(", ") if e.at_bound else within
         cells = [symbol(e.name), value if e.determined or not known else f"({value})", unit, within]
         if fit.budget:
             shifted, both = budget_cells(e, factor)
@@ -225,7 +252,8 @@ def parameter_table(fit: Identification) -> Table:
             theirs = published.get(e.name, math.nan)
             cells.append(significant(theirs * factor, 4))
         # without intervals all notes are the same, and the page shows it once
-        rows.append(Row(tuple(cells), e.note if known else "", known and not e.determined))
+        details = [stated_text(e)] if e.is_fixed or not known else [e.note, stated_text(e)]
+        rows.append(Row(tuple(cells), "; ".join(filter(None, details)), known and not e.determined))
     head = [("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", "")]
     if fit.budget:
         head += BUDGET_HEAD
@@ -235,7 +263,9 @@ def parameter_table(fit: Identification) -> Table:
     if fit.budget:
         notes.append(budget_text(fit.budget))
     if any(e.at_bound for e in fit.estimates):
-        notes.append("At bound: at an end of the search range; the data may ask for more.")
+        notes.append("At bound: at an end of its range; the data may ask for more.")
+    if any(e.is_fixed for e in fit.estimates):
+        notes.append("Fixed: stated before the fit, not fitted; intervals hold for that value.")
     if known and fit.undetermined:
         notes.append(BRACKETS_TEXT)
     if published:
