@@ -11,23 +11,30 @@ import numpy as np
 from dearig.analysis import simulate
 from dearig.api.display import card, drawing, facts, write_page
 from dearig.api.models import Model
+from dearig.api.written import HasFiles, HasPage, Writers
 from dearig.extras import import_extra
 from dearig.recording.content.layout import UNITS
 from dearig.recording.reading.origin import Origin
 from dearig.report.figures.signals import signal_figure
+from dearig.report.text.bands import band_texts
 from dearig.report.text.numbers import seconds, significant
+from dearig.report.text.sentences import pull_in_text
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
+    from dearig.analysis.readings.band import PredictionBand
+
 __all__ = ["Prediction"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prediction:
+class Prediction(HasFiles, HasPage):
     """Prediction of a model under a drive; arrays are (N,) in SI units.
+
+    It is saved as ``.h5`` (a recording) or ``.csv`` (a table).
 
     Attributes
     ----------
@@ -56,11 +63,28 @@ class Prediction:
     @property
     def response(self) -> np.ndarray:
         """The displacement in m from the loaded rest state, or the nominal stress in Pa."""
-        actuator = self.prediction.kind == "actuator"
-        return self.prediction.values["displacement" if actuator else "nominal_stress"]
+        return self.prediction.response
+
+    @property
+    def band(self) -> PredictionBand | None:
+        """The 95 % band of one reading and its parts; None where the model has no covariance.
+
+        ``half_width`` and ``parameters`` are (N,), ``noise`` and ``law`` numbers, in m or Pa.
+        """
+        return self.prediction.band
+
+    @property
+    def low95(self) -> np.ndarray | None:
+        """The lower end of the 95 % band (N,) in m or Pa; None where there is none."""
+        return None if self.band is None else self.response - self.band.half_width
+
+    @property
+    def high95(self) -> np.ndarray | None:
+        """The upper end of the 95 % band (N,) in m or Pa; None where there is none."""
+        return None if self.band is None else self.response + self.band.half_width
 
     def to_pandas(self) -> DataFrame:
-        """Return the values as a data frame.
+        """Return the values and the band as a data frame.
 
         Returns
         -------
@@ -73,62 +97,31 @@ class Prediction:
             If pandas is not installed.
         """
         lib = import_extra("pandas", "notebook", "to_pandas")
-        values = dict(self.prediction.values)
+        values = self.prediction.columns
         index = lib.Index(values.pop("time"), name="time")
         frame: DataFrame = lib.DataFrame(values, index=index)
         frame.attrs["units"] = {name: UNITS[name] for name in values}
         return frame
 
     def plot(self) -> Figure:
-        """Plot the drive and the predicted response over time.
+        """Plot the drive, and the predicted response with its band, over time.
 
         Returns
         -------
         matplotlib.figure.Figure
             The figure, with axes in the units that its labels name.
         """
-        return signal_figure(self.prediction.kind, self.time, self.drive, model=self.response)
+        return signal_figure(
+            self.prediction.kind, self.time, self.drive, model=self.response, band=self.band
+        )
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write a recording or a table.
+    def _writers(self) -> Writers:
+        def save(out: Path, overwrite: bool) -> Path:
+            return simulate.save_prediction(self.prediction, out, overwrite)
 
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.h5`` (recording) or ``.csv`` (table).
-        overwrite : bool
-            Replace a file that exists.
+        return {".h5": ("a recording", save), ".csv": ("a table", save)}
 
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        return simulate.save_prediction(self.prediction, path, overwrite)
-
-    def to_html(self, path: str | Path) -> Path:
-        """Write a page with the main facts and a figure.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_page(
             path, self.prediction.title, "Prediction", self._repr_html_(), (self._origin,)
         )
@@ -156,8 +149,7 @@ class Prediction:
         ]
         if found.field_max is not None:
             rows.append(("true field", f"up to {significant(found.field_max * 1e-6)} MV/m"))
-            limit = "none: the springs stiffen first"
-            if found.pull_in is not None:
-                limit = f"{significant(found.pull_in * 1e-3)} kV"
-            rows.append(("static pull-in", limit))
-        return card(found.title, facts(rows), drawing(self.plot(), f"{found.title} over time"))
+            rows.append(("static pull-in", pull_in_text(found)))
+        said = () if self.band is None else band_texts(self.band, found.kind)
+        picture = drawing(self.plot(), f"{found.title} over time")
+        return card(found.title, facts(rows), picture, sentences=said)

@@ -66,6 +66,8 @@ _POPULATIONS = 20.0  # simulated until a descent counts as half done
 _COARSE_SAMPLES = 1500  # of a film record
 _MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
+_GAIN_LEFT = 0.1  # of the gain that counts: where a fit ends that is reported
+_RESOLVED = 0.2  # of a mean's interval: the shortest relaxation time of a search on means
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
 # Of an interval's width, which means and quicker steps may change: it changes a coverage of 95 %
 # by a quarter of a per cent
@@ -189,7 +191,12 @@ def add_intervals(
         try:
             found = _intervals(problem, layout.initial(), held, progress, gain)
         except BetterPoint as better:
-            fit = descend(problem, better.x, held, damping=1e-4)
+            x = better.x
+            if isinstance(layout.base, Actuator):
+                means = coarse_problem(problem, corrected=True)
+                x = _descend_on_means(problem, means, x, held)
+                simulations += means.simulations
+            fit = descend(problem, x, held, damping=1e-4)
             here = problem.costs(layout.coordinates(layout.initial())[None])[0]
             if fit.cost < here:
                 fitted = _result(
@@ -419,15 +426,16 @@ def fit_globally(
             counted(count, cost)
 
     problem.on_simulations = on_all_readings
+    scouts = _of_resolved_times(coarse) if driven_by_voltage else coarse
     fits = []
     for start in starts:
-        fits.append(descend(coarse, start, first, iterations=_SCOUT_ITERATIONS))
+        fits.append(descend(scouts, start, first, iterations=_SCOUT_ITERATIONS))
         descents.ended()
     # two, because the best after a few steps is not always the best at the end
     leaders = sorted(fits, key=lambda f: f.cost)[:2]
     ends = []
     for leader in leaders:
-        ends.append(descend(coarse, leader.x, first))
+        ends.append(descend(scouts, leader.x, first))
         descents.ended()
     x = min(ends, key=lambda f: f.cost).x
     if driven_by_voltage:
@@ -441,11 +449,29 @@ def fit_globally(
                 first = layout.fixed
                 x = _descend_on_means(problem, coarse, freed.x, first)
     descents.ended()
-    fit = descend(problem, x, first, damping=1e-4)
+    fit = descend(problem, x, first, gain=_little_gain(problem, x), damping=1e-4)
     problem.on_simulations = counted
     progress("descents", 1.0)
     problem.simulations += coarse.simulations
+    if scouts is not coarse:
+        problem.simulations += scouts.simulations
     return fit, first
+
+
+def _of_resolved_times(means: Problem) -> Problem:
+    """Return the problem on ``means`` without relaxation times that they do not resolve.
+
+    To means a branch so fast is a drag, with any time; and it makes the film stiff.
+    """
+    layout = copy(means.layout)
+    layout.lower = layout.lower.copy()
+    step = min(float(np.median(np.diff(r.time))) for r in means.records)
+    times = layout.column("T")
+    least = np.maximum(layout.lower[times], math.log(_RESOLVED * step))
+    layout.lower[times] = np.minimum(least, layout.upper[times])
+    found = copy(means)
+    found.layout = layout
+    return found
 
 
 def _descend_on_means(
@@ -460,7 +486,7 @@ def _descend_on_means(
     x, cost = start, float(problem.costs(start[None])[0])
     for _ in range(_CORRECTIONS_MAX):
         recentre(means, problem, problem.layout.values(x))
-        moved = descend(means, x, held, damping=1e-4).x
+        moved = descend(means, x, held, gain=_little_gain(problem, x), damping=1e-4).x
         reached = float(problem.costs(moved[None])[0])
         gained = (cost - reached) * problem.samples
         if gained > 0.0:
@@ -468,6 +494,12 @@ def _descend_on_means(
         if gained < gain_that_counts(cost * problem.samples, problem.samples):
             break
     return x
+
+
+def _little_gain(problem: Problem, x: np.ndarray) -> float:
+    """Return the gain in chi-square of ``problem`` near ``x`` (d,) that ends the last descents."""
+    chi2 = float(problem.costs(x[None])[0]) * problem.samples
+    return _GAIN_LEFT * gain_that_counts(chi2, problem.samples)
 
 
 def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: int) -> bool:

@@ -11,9 +11,11 @@ from dearig.model.fitting.problem import Problem
 
 __all__ = ["LocalFit", "descend", "gain_that_counts"]
 
-_DAMPINGS = np.array([1e-4, 1e-2, 1.0, 30.0])  # tried at once, relative to the current damping
+# tried at once, relative to the current one: a step ten times too long leaves a narrow valley
+_DAMPINGS = np.array([0.03, 0.3, 3.0, 30.0])
 _DAMPING_MIN, _DAMPING_MAX = 1e-12, 1e8
 _GAIN_MIN = 0.1  # of chi-square: a third of a standard deviation of any parameter
+_GAIN_LEFT = 0.01  # of the gain asked for: the step to so little is not taken
 _PROBE = 0.1  # of a step: length of the finite difference along it
 _BEND_MAX = 0.4  # of a step: a larger second-order part is left out
 _GAIN_MISFIT = 0.01  # of chi-square over the number of samples, where residuals exceed the noise
@@ -25,9 +27,10 @@ _FLAT = 1e-9  # of the scaled curvature: the data do not determine flatter direc
 class LocalFit:
     """End of a descent: coordinates ``x`` (d,), mean-square cost, residuals (N,).
 
-    ``jacobian`` (N, f) over the free coordinates is that of the last iteration: at ``x`` where the
-    descent converged, else one step before. ``to_gain`` is what the quadratic model at ``x`` would
-    still take off chi-square, 0 where there is none at ``x``.
+    ``jacobian`` (N, f) over the free coordinates is that of the last iteration, at ``x`` or one
+    step before. ``to_gain`` is what the quadratic model at ``x`` would still take off chi-square, 0
+    where there is none at ``x``. ``beside`` (N, b) are the columns of other parameters where
+    ``jacobian`` is, as far as they were asked for.
     """
 
     x: np.ndarray
@@ -37,6 +40,7 @@ class LocalFit:
     iterations: int
     converged: bool
     to_gain: float = 0.0
+    beside: np.ndarray | None = None
 
 
 def descend(
@@ -48,6 +52,9 @@ def descend(
     damping: float = 1e-2,
     patience: int = _PATIENCE,
     quick: bool = False,
+    straight: bool = False,
+    known: np.ndarray | None = None,
+    beside: np.ndarray | None = None,
 ) -> LocalFit:
     """Minimise least squares from ``start`` (d,), inside the layout's bounds: one loop, one state.
 
@@ -57,17 +64,24 @@ def descend(
     population on all cores, each with its geodesic acceleration: the valleys of relaxation spectra
     are long, narrow and curved.
 
-    It ends when the quadratic model predicts a gain in chi-square of less than ``gain``, or when
+    It ends with the step for which the quadratic model predicts a gain in chi-square of less than
+    ``gain`` (not taken by a ``straight`` one: see ``LocalFit.to_gain``), or when
     ``patience`` iterations together gained less. Without a ``gain`` it is a tenth, or more where
     the residuals are far above the noise. ``damping`` is the first one, relative to the
     scaled curvature; near an optimum it may be small. ``quick`` takes one-sided differences at
     half the cost; they blur only the difference of two branches of nearly equal relaxation times.
+    ``straight`` is for a start next to the optimum: steps have no second order, and the Jacobian of
+    a step tells how much gain the step left. ``known`` are the residuals (N,) at ``start``, None
+    where they are to be computed. ``beside`` (d,) bool are ``fixed`` parameters whose derivatives
+    are asked for with the others.
     """
     layout = problem.layout
     free = np.ones(layout.size, dtype=bool) if fixed is None else ~fixed
     x = np.clip(start, layout.lower, layout.upper)
-    r = problem.residuals(x)
+    r = problem.residuals(x) if known is None else known
     chi2 = float(r @ r)
+    asked = free if beside is None else free | beside
+    whole = np.zeros((r.size, int(asked.sum())))
     scale = np.zeros(int(free.sum()))
     jac = np.zeros((r.size, scale.size))
     history = [chi2]
@@ -75,7 +89,8 @@ def descend(
     done, to_gain = 0, 0.0
     while done < iterations and not converged:
         done += 1
-        jac = problem.jacobian(x, free, r if quick else None)
+        whole = problem.jacobian(x, asked, r if quick else None)
+        jac = whole if beside is None else whole[:, free[asked]]
         normal, gradient = jac.T @ jac, jac.T @ r
         scale = np.maximum(np.sqrt(np.diag(normal)), 1e-3 * scale)
         safe = np.where(scale > 0.0, scale, 1.0)
@@ -93,7 +108,8 @@ def descend(
         enough = gain_that_counts(chi2, problem.samples) if gain is None else gain
         # gain that the quadratic model predicts, flat directions excepted
         predicted = float(np.sum(target**2 / np.maximum(w, _FLAT)))
-        if predicted < enough:
+        last = predicted < enough
+        if last and (straight or predicted < _GAIN_LEFT * enough):
             converged, to_gain = True, predicted
             break
         improved = False
@@ -104,24 +120,34 @@ def descend(
             steps = np.zeros((dampings.size, part.size))
             steps[:, move] = -((inverse * target) @ q.T) / safe[move]
             steps /= np.maximum(1.0, np.max(np.abs(steps) / reach, axis=1))[:, None]
-            steps += _bend(problem, x, free, r, jac, steps, move, safe, q, inverse)
+            if not (straight or last):
+                steps += _bend(problem, x, free, r, jac, steps, move, safe, q, inverse)
             trials = np.tile(x, (dampings.size, 1))
             trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
-            costs = problem.costs(trials) * problem.samples
+            means, residuals = problem.evaluate(trials)
+            costs = means * problem.samples
             best = int(np.argmin(costs))
             if costs[best] < chi2:
                 improved = True
-                x, chi2 = trials[best], float(costs[best])
+                x, chi2, r = trials[best], float(costs[best]), residuals[best]
                 damping = max(dampings[best], _DAMPING_MIN)
             else:
                 damping *= 1e3
-        if not improved:
+            if last:
+                break
+        if last or not improved:
             converged = True
             break
-        r = problem.residuals(x)
         history.append(chi2)
+        if straight:
+            target = q.T @ ((jac.T @ r) / safe)[move]
+            left = float(np.sum(target**2 / np.maximum(w, _FLAT)))
+            if left < enough:
+                converged, to_gain = True, left
+                break
         converged = len(history) > patience and history[-1 - patience] - chi2 < enough
-    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged, to_gain)
+    others = None if beside is None else whole[:, beside[asked]]
+    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged, to_gain, others)
 
 
 def gain_that_counts(chi2: float, samples: int) -> float:
