@@ -482,7 +482,7 @@ def sense(
         float | None,
         typer.Option(
             help="Relative standard uncertainty of the gain.",
-            show_default="0.014: 1 % of the current and of the voltage",
+            show_default="what the rig file states of the scales, else 1 % for each",
         ),
     ] = None,
     out: Annotated[
@@ -497,7 +497,7 @@ def sense(
     Gives its standard error, and compares it with the laser. Takes rows that are means ([card]
     average) and a voltage that comes back to 0 V.
     """
-    from dearig.analysis.readings.sense import CHARGE_ERROR, save_sensed, sense_recording
+    from dearig.analysis.readings.sense import save_sensed, sense_recording
     from dearig.report.sensed import sense_json, sensed_texts
 
     check_files(force, (recording, model), *optional(out), json=json)
@@ -507,7 +507,7 @@ def sense(
             model,
             drive=drive.value,
             gain=gain,
-            gain_error=CHARGE_ERROR if gain_error is None else gain_error,
+            gain_error=gain_error,
         )
         if out is not None:
             save_sensed(outcome, out, force)
