@@ -13,7 +13,7 @@ from dearig.analysis.outcomes import (
     pooled_over_noise,
     pooled_steady_rms,
 )
-from dearig.model.verdict import is_rejected, smallest_p
+from dearig.model.verdict import COMPLETE, STOPPED, is_rejected, smallest_p
 from dearig.report.made import made_now
 from dearig.report.stored import Outcome, stored
 from dearig.report.text.laws import effect_named, law_json
@@ -78,6 +78,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "kind": outcome.kind,
         "method": outcome.method,
         "converged": bool(fit.converged),
+        "status": STOPPED if outcome.interrupted else COMPLETE,
         "model_path": outcome.model_path,
         **_noise_json(outcome.kind, outcome.train),
         "residual_over_noise": _number(pooled_over_noise(outcome.train)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -174,10 +174,12 @@ def add_intervals(
     fitted: Identification,
     workers: int = 2,
     progress: Progress = _quiet,
+    ended: Callable[[], bool] = lambda: False,
 ) -> Identification:
     """Return ``fitted`` with 95 % intervals; ``records`` are its training records.
 
     Where a profile comes to a better point, the fit moves there, and the intervals are about that.
+    Once ``ended()`` is True, the intervals that are left come from the curvature at the optimum.
     """
     layout = FitLayout(fitted.model, constraints=fitted.constraints)
     problem = Problem(records, layout, workers)
@@ -187,7 +189,7 @@ def add_intervals(
     gain: float | None = None
     for _ in range(MOVES_MAX):
         try:
-            found = _intervals(problem, layout.initial(), held, progress, gain)
+            found = _intervals(problem, layout.initial(), held, progress, gain, ended)
         except BetterPoint as better:
             fit = descend(problem, better.x, held, damping=1e-4)
             here = problem.costs(layout.coordinates(layout.initial())[None])[0]
@@ -203,7 +205,7 @@ def add_intervals(
         else:
             break
     if found is None:
-        found = _intervals(problem, layout.initial(), held, progress, math.inf)
+        found = _intervals(problem, layout.initial(), held, progress, math.inf, ended)
     warnings = fitted.warnings
     if found.sums:
         warnings = (*warnings, sums_text(found.sums))
@@ -486,6 +488,7 @@ def _intervals(
     held: np.ndarray,
     progress: Progress,
     gain: float | None,
+    ended: Callable[[], bool],
 ) -> Intervals:
     """Return estimates with profile-likelihood intervals; ``held`` (d,) limits are undetermined."""
     if not isinstance(problem.layout.base, Actuator):
@@ -499,6 +502,7 @@ def _intervals(
         values,
         held,
         lambda part: progress("intervals", min(part, 1.0)),
+        ended=ended,
         gain=gain,
         finer=levels[1] if len(levels) > 1 else None,
     )
