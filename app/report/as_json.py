@@ -84,6 +84,10 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "residual_over_noise": _number(pooled_over_noise(outcome.train)),
         **_rejection_json(outcome.train),
         "prior_p": _number(fit.prior_p),
+        "starts": [
+            {"mean_square_over_noise": _number(cost), "followed": followed}
+            for cost, followed in fit.starts
+        ],
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
         "sums": [_parameter_json(e, known) for e in fit.sums],
         "covariance": covariance_table(fit.covariance_names, fit.covariance),

@@ -27,7 +27,9 @@ class LocalFit:
 
     ``jacobian`` (N, f) over the free coordinates is that of the last iteration: at ``x`` where the
     descent converged, else one step before. ``to_gain`` is what the quadratic model at ``x`` would
-    still take off chi-square, 0 where there is none at ``x``.
+    still take off chi-square, 0 where there is none at ``x``. ``starts`` are those of the global
+    search that led here, best first: the cost that each reached, and whether it was followed to its
+    end.
     """
 
     x: np.ndarray
@@ -37,6 +39,7 @@ class LocalFit:
     iterations: int
     converged: bool
     to_gain: float = 0.0
+    starts: tuple[tuple[float, bool], ...] = ()
 
 
 def descend(
