@@ -12,6 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from dearig.acquisition.compilation import compilation_reported
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.run import record
 from dearig.config.rigfile import RigFile
@@ -20,8 +21,10 @@ from dearig.model.compiled.jit import cache_folder, is_enabled
 from dearig.model.film.material import TABLE_3
 from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
+from dearig.sim_backend.truth.circuit import electricity
+from dearig.sim_backend.truth.film import follow
 
-__all__ = ["compile_kernels", "has_cache", "is_warm", "kernels_compiled"]
+__all__ = ["compile_kernels", "has_cache", "is_warm"]
 
 #: Rigs whose kernels a window needs: a plan, an overlay model, and both simulated films.
 _RIGS = ("sim", "sim:1")
@@ -47,28 +50,30 @@ def has_cache() -> bool:
     return cache_folder() is not None
 
 
-def kernels_compiled() -> int:
-    """Return the number of kernels in the cache, also while another process compiles them."""
-    folder = cache_folder()
-    return 0 if folder is None else sum(1 for _ in folder.rglob("*.nbi"))
-
-
 def compile_kernels(progress: Progress = quiet) -> None:
-    """Compile what a window needs, by a short run on each simulated rig with an overlay model."""
+    """Compile what a window needs, by a short run on each simulated rig with an overlay model.
+
+    The stages of the progress are "kernel 12 of 300".
+    """
     rig_file = RigFile()
     actuator = Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
     overlay = OverlayModel("Table 3", actuator)
     loaded = parse_sequence(_SEQUENCE, "the sequence", Path())
-    with tempfile.TemporaryDirectory(prefix="dearig-compile-") as folder:
+
+    def report(ready: int, needed: int) -> None:
+        progress(f"kernel {ready} of {needed}", ready / needed)
+
+    with (
+        tempfile.TemporaryDirectory(prefix="dearig-compile-") as folder,
+        compilation_reported(report, (electricity, follow)),
+    ):
         for number, address in enumerate(_RIGS):
-            progress("compiling", number / len(_RIGS))
             record(loaded, address, rig_file, Path(folder, f"{number}.h5"), overlay=overlay)
     note = _note()
     if note is not None:
         # without it the next start compiles nothing anew, it only looks again
         with contextlib.suppress(OSError):
             os.close(os.open(note, os.O_CREAT | os.O_WRONLY, 0o600))
-    progress("compiling", 1.0)
 
 
 def _note() -> Path | None:

@@ -14,9 +14,8 @@ from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing, write_page
 from dearig.api.models import ModelSource, read_model
 from dearig.api.recordings import Recording, RigSource, load_rig, rig_provenance
-from dearig.errors import InputError
+from dearig.api.written import HasFiles, HasPage, Writers
 from dearig.progress import Progress, quiet
-from dearig.recording.files import check_output
 from dearig.recording.json_file import write_json
 from dearig.recording.reading.origin import origin_of
 from dearig.recording.reading.reader import open_recording
@@ -31,8 +30,8 @@ _DEFAULT = HoldOptions()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HoldResult:
-    """Result of a hold.
+class HoldResult(HasFiles, HasPage):
+    """Result of a hold, saved as ``.json`` (all numbers).
 
     Attributes
     ----------
@@ -62,53 +61,13 @@ class HoldResult:
         """
         return hold_figure(self.outcome)
 
-    def to_html(self, path: str | Path) -> Path:
-        """Write a page with the summary and the figure.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_page(
             path, self._title, "Hold", self._repr_html_(), (origin_of(self.recording),)
         )
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write all numbers.
-
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.json``.
-        overwrite : bool
-            Replace a file that exists.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        out = check_output(path, overwrite)
-        if out.suffix != ".json":
-            raise InputError(f"{path}: all numbers are written as JSON; end the name in .json")
-        write_json(hold_json(self.outcome), out)
-        return out
+    def _writers(self) -> Writers:
+        return {".json": ("all numbers", lambda out, _: write_json(hold_json(self.outcome), out))}
 
     def __repr__(self) -> str:
         """Return the summary in sentences."""

@@ -11,6 +11,7 @@ import numpy as np
 from dearig.analysis import simulate
 from dearig.api.display import card, drawing, facts, write_page
 from dearig.api.models import Model
+from dearig.api.written import HasFiles, HasPage, Writers
 from dearig.extras import import_extra
 from dearig.recording.content.layout import UNITS
 from dearig.recording.reading.origin import Origin
@@ -26,8 +27,10 @@ __all__ = ["Prediction"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prediction:
+class Prediction(HasFiles, HasPage):
     """Prediction of a model under a drive; arrays are (N,) in SI units.
+
+    It is saved as ``.h5`` (a recording) or ``.csv`` (a table).
 
     Attributes
     ----------
@@ -89,46 +92,13 @@ class Prediction:
         """
         return signal_figure(self.prediction.kind, self.time, self.drive, model=self.response)
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write a recording or a table.
+    def _writers(self) -> Writers:
+        def save(out: Path, overwrite: bool) -> Path:
+            return simulate.save_prediction(self.prediction, out, overwrite)
 
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.h5`` (recording) or ``.csv`` (table).
-        overwrite : bool
-            Replace a file that exists.
+        return {".h5": ("a recording", save), ".csv": ("a table", save)}
 
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        return simulate.save_prediction(self.prediction, path, overwrite)
-
-    def to_html(self, path: str | Path) -> Path:
-        """Write a page with the main facts and a figure.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_page(
             path, self.prediction.title, "Prediction", self._repr_html_(), (self._origin,)
         )

@@ -22,6 +22,7 @@ from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing, facts, write_page
 from dearig.api.models import ModelSource, read_model
 from dearig.api.sequences import SequenceSource, as_loaded
+from dearig.api.written import HasPage
 from dearig.config.modelfile import ModelFile, model_toml
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile, load_rig_file
@@ -49,7 +50,7 @@ RigSource = str | Path | Mapping[str, Mapping[str, object]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(stored.Recording):
+class Recording(stored.Recording, HasPage):
     """A recording: arrays (N,) in SI units, read when they are first used, and its metadata.
 
     Attributes
@@ -121,24 +122,7 @@ class Recording(stored.Recording):
             shutil.copyfile(self.path, partial)
         return out
 
-    def to_html(self, path: str | Path) -> Path:
-        """Write a page with the main facts and a figure.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_page(path, self.name, "Recording", self._repr_html_(), (origin_of(self),))
 
     def __repr__(self) -> str:

@@ -19,8 +19,8 @@ from dearig.api.display import card, drawing, table_html
 from dearig.api.models import Model
 from dearig.api.rows import Parameter, RecordingErrors, Rows, errors_of, parameters_of
 from dearig.api.sequences import Sequence as VoltageSequence
+from dearig.api.written import HasFiles, HasPage, Writers
 from dearig.errors import InputError
-from dearig.recording.files import check_output
 from dearig.recording.json_file import write_json
 from dearig.report.as_json import result_json
 from dearig.report.figures import recordings as figures
@@ -39,12 +39,6 @@ if TYPE_CHECKING:
 __all__ = ["DiagnoseResult", "IdentifyResult", "ValidateResult"]
 
 
-def _save_json(result: _Reported, path: Path, overwrite: bool) -> Path:
-    out = check_output(path, overwrite)
-    write_json(result_json(result.outcome), out)
-    return out
-
-
 def _named(comparisons: Sequence[Comparison], name: str, others: Sequence[str]) -> Comparison:
     """The comparison called ``name``. Raises ``InputError``, which lists what can be plotted."""
     for comparison in comparisons:
@@ -54,7 +48,7 @@ def _named(comparisons: Sequence[Comparison], name: str, others: Sequence[str]) 
     raise InputError(f"{name!r} cannot be plotted; what can is {', '.join(known)}")
 
 
-class _Reported:
+class _Reported(HasFiles, HasPage):
     """What all results have: the residual on each recording, and a report."""
 
     outcome: IdentifyOutcome | ValidateOutcome | DiagnoseOutcome
@@ -89,30 +83,16 @@ class _Reported:
         known = ", ".join(c.name for c in self._comparisons)
         raise InputError(f"there is no recording {name!r} in this result; it has {known}")
 
-    def to_html(self, path: str | Path) -> Path:
-        """Write the report.
+    def _writers(self) -> Writers:
+        return {".json": ("all numbers", lambda out, _: write_json(result_json(self.outcome), out))}
 
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_report(self.outcome, path)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IdentifyResult(_Reported):
-    """Result of an identification.
+    """Result of an identification, saved as ``.toml`` (its model) or ``.json`` (all numbers).
 
     Attributes
     ----------
@@ -189,27 +169,11 @@ class IdentifyResult(_Reported):
                 return branches_figure(outcome.trials, outcome.kind)
         return figures.comparison_figure(_named(self._comparisons, what, others))
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the model or all numbers.
+    def _writers(self) -> Writers:
+        def model(out: Path, overwrite: bool) -> None:
+            self.model.save(out, overwrite=overwrite)
 
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.toml`` (model) or ``.json`` (all numbers).
-        overwrite : bool
-            Replace a file that exists.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        return _save(self, Path(path), overwrite)
+        return {".toml": ("the model", model), **super()._writers()}
 
     def __repr__(self) -> str:
         """Return the summary in sentences."""
@@ -229,7 +193,7 @@ class IdentifyResult(_Reported):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ValidateResult(_Reported):
-    """Result of a validation.
+    """Result of a validation, saved as ``.json`` (all numbers).
 
     Attributes
     ----------
@@ -278,31 +242,6 @@ class ValidateResult(_Reported):
             return residual_figure(worst)
         return figures.comparison_figure(_named(every, what or worst.name, ["residual"]))
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write all numbers.
-
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.json``.
-        overwrite : bool
-            Replace a file that exists.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        out = Path(path)
-        if out.suffix != ".json":
-            raise InputError(f"{out}: a validation is saved as numbers, in a file that ends .json")
-        return _save_json(self, out, overwrite)
-
     def __repr__(self) -> str:
         """Return the summary in sentences."""
         return "\n".join(validate_summary(self.outcome))
@@ -320,6 +259,8 @@ class ValidateResult(_Reported):
 @dataclass(frozen=True, eq=False, repr=False)
 class DiagnoseResult(_Reported):
     """Result of a diagnosis, finished or interrupted.
+
+    It is saved as ``.toml`` (its model) or ``.json`` (all numbers).
 
     Attributes
     ----------
@@ -422,27 +363,11 @@ class DiagnoseResult(_Reported):
         chosen = _named([after for _, after in pairs], what, ["errors"])
         return before_after_figure(first[chosen.name], chosen)
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the model or all numbers.
+    def _writers(self) -> Writers:
+        def model(out: Path, overwrite: bool) -> None:
+            self.model.save(out, overwrite=overwrite)
 
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.toml`` (model) or ``.json`` (all numbers).
-        overwrite : bool
-            Replace a file that exists.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        return _save(self, Path(path), overwrite)
+        return {".toml": ("the model", model), **super()._writers()}
 
     def __repr__(self) -> str:
         """Return the verdict in sentences."""
@@ -463,11 +388,3 @@ class DiagnoseResult(_Reported):
         if outcome.after.train:
             parts.append(drawing(self.plot(), "RMS errors before and after"))
         return card(self.headline, *parts, sentences=[*words.summary(outcome), *self.warnings])
-
-
-def _save(result: IdentifyResult | DiagnoseResult, path: Path, overwrite: bool) -> Path:
-    if path.suffix == ".toml":
-        return result.model.save(path, overwrite=overwrite)
-    if path.suffix == ".json":
-        return _save_json(result, path, overwrite)
-    raise InputError(f"{path}: end the name in .toml for the model or in .json for all numbers")

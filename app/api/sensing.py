@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +12,8 @@ from dearig.analysis.readings.sense import CHARGE_ERROR, SenseOutcome, save_sens
 from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing
 from dearig.api.models import ModelSource, as_model_file
+from dearig.api.written import HasFiles, Writers
+from dearig.recording.json_file import write_json
 from dearig.report.figures.signals import signal_figure
 from dearig.report.sensed import sense_json, sensed_texts
 
@@ -23,8 +24,10 @@ __all__ = ["SenseResult", "sense"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SenseResult:
+class SenseResult(HasFiles):
     """Displacement of a recording from voltage and current; arrays are (N,) in SI units.
+
+    It is saved as ``.csv`` (a row for each time) or ``.json`` (all numbers).
 
     Attributes
     ----------
@@ -54,16 +57,6 @@ class SenseResult:
         """How large the error is, and what would reduce it."""
         return self.outcome.sentences
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what the command writes as JSON.
-
-        Returns
-        -------
-        dict
-            Plain values; units are at the ends of the keys.
-        """
-        return sense_json(self.outcome)
-
     def plot(self) -> Figure:
         """Plot the voltage, and the displacement of the laser and of the film as its own sensor.
 
@@ -77,27 +70,11 @@ class SenseResult:
             "actuator", found.time, found.voltage, found.laser, found.sensed.displacement
         )
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write a table with a row for each time.
-
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.csv``.
-        overwrite : bool
-            Replace a file that exists.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        return save_sensed(self.outcome, path, overwrite)
+    def _writers(self) -> Writers:
+        return {
+            ".csv": ("the rows", lambda out, overwrite: save_sensed(self.outcome, out, overwrite)),
+            ".json": ("all numbers", lambda out, _: write_json(sense_json(self.outcome), out)),
+        }
 
     def __repr__(self) -> str:
         """Return the recording and its rows in a line."""

@@ -12,6 +12,7 @@ import numpy as np
 import tomli_w
 
 from dearig.api.display import card, drawing, facts, write_page
+from dearig.api.written import HasPage
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.segments import SEGMENT_KINDS
@@ -29,7 +30,7 @@ __all__ = ["Sequence", "SequenceSource", "as_loaded"]
 _TO_ZERO = {"kind": "ramp", "to_kV": 0.0, "duration_s": 1.0}
 
 
-class Sequence:
+class Sequence(HasPage):
     """A sequence of voltage segments, at 0 V before and after.
 
     Every kind of segment is a method that returns a new sequence with such a segment at its end::
@@ -303,24 +304,7 @@ class Sequence:
             partial.write_text(self.toml, encoding="utf-8")
         return out
 
-    def to_html(self, path: str | Path) -> Path:
-        """Write a page with the voltage over time.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_page(path, self.name, "Sequence", self._repr_html_())
 
     def __repr__(self) -> str:

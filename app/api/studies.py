@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing, table_html, write_page
 from dearig.api.models import ModelSource, as_model_file
+from dearig.api.written import HasFiles, HasPage, Writers
 from dearig.batch import trends as batch_trends
 from dearig.batch.engines import engine_at
 from dearig.batch.fits import StudyOptions, fit_task
@@ -27,7 +28,6 @@ from dearig.config.modelfile import ModelFile
 from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.progress import Progress, quiet
-from dearig.recording.files import check_output
 from dearig.recording.json_file import write_json
 from dearig.recording.reading.recording import Recording
 from dearig.report.figures.trends import life_figure, rows_figure, trend_figure
@@ -47,8 +47,10 @@ StudySource = str | Path | Recording
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StudyResult:
+class StudyResult(HasFiles, HasPage):
     """Rows of a study, one for each recording, in the order in which they were started.
+
+    It is saved as ``.csv`` or ``.parquet`` (the rows) or ``.json`` (all numbers).
 
     Attributes
     ----------
@@ -109,56 +111,18 @@ class StudyResult:
             raise InputError(f"{number!r} is no number of this study; it has {', '.join(known)}")
         return rows_figure(self.rows, number)
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the table.
-
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.csv``, ``.parquet`` or ``.json``.
-        overwrite : bool
-            Replace a file that exists.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        out = check_output(path, overwrite)
-        if out.suffix == ".csv":
-            write_csv(self.rows, out)
-        elif out.suffix == ".json":
-            write_json(study_table_json(self.table), out)
-        elif out.suffix == ".parquet":
+    def _writers(self) -> Writers:
+        def parquet(out: Path, _: bool) -> None:
             import_extra("pyarrow", "parquet", "a table in Parquet")
             write_parquet(self.rows, out)
-        else:
-            raise InputError(f"{path}: end the name in .csv, .parquet or .json")
-        return out
 
-    def to_html(self, path: str | Path) -> Path:
-        """Write a page with the rows.
+        return {
+            ".csv": ("the rows", lambda out, _: write_csv(self.rows, out)),
+            ".parquet": ("the rows with their types", parquet),
+            ".json": ("all numbers", lambda out, _: write_json(study_table_json(self.table), out)),
+        }
 
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         body = self._html(len(self.rows))
         return write_page(path, "Study", "Study", body, origins_of_rows(self.rows))
 
@@ -175,8 +139,8 @@ class StudyResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TrendsResult:
-    """What many recordings say together.
+class TrendsResult(HasFiles, HasPage):
+    """What many recordings say together, saved as ``.csv`` (effects) or ``.json`` (all numbers).
 
     Attributes
     ----------
@@ -246,53 +210,16 @@ class TrendsResult:
             return life_figure(self.trends, every[name])
         raise InputError(f"{what!r} cannot be plotted; what can is columns, films")
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the effects or all numbers.
-
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.csv`` (a row for each effect) or ``.json`` (all numbers).
-        overwrite : bool
-            Replace a file that exists.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        out = check_output(path, overwrite)
-        if out.suffix == ".csv":
-            write_csv(self.effects, out)
-        elif out.suffix == ".json":
+    def _writers(self) -> Writers:
+        def numbers(out: Path, _: bool) -> None:
             write_json(trends_json(self.trends, self.source, {}), out)
-        else:
-            raise InputError(f"{path}: end the name in .csv for the effects or in .json for all")
-        return out
 
-    def to_html(self, path: str | Path) -> Path:
-        """Write the report.
+        return {
+            ".csv": ("the effects", lambda out, _: write_csv(self.effects, out)),
+            ".json": ("all numbers", numbers),
+        }
 
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_trends_report(self.trends, f"Trends of {self.source.stem}", Path(path))
 
     def __repr__(self) -> str:

@@ -17,13 +17,14 @@ from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing, facts, table_html, write_page
 from dearig.api.models import ModelSource, read_model
 from dearig.api.recordings import Recording, RigSource, load_rig, rig_provenance
+from dearig.api.written import HasFiles, HasPage, Writers
 from dearig.config.targetfile import LoadedTarget, load_target, target_of
 from dearig.errors import InputError
 from dearig.model.control import Unreachable
 from dearig.model.control import inversion as control
 from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
-from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.files import replaced_when_done
 from dearig.recording.json_file import write_json
 from dearig.recording.reading.reader import open_recording
 from dearig.report.figures.signals import signal_figure
@@ -47,8 +48,10 @@ TargetSource = str | Path | tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Inversion:
+class Inversion(HasFiles, HasPage):
     """Voltage with which a model follows a target; arrays are (N,) in SI units.
+
+    It is saved as ``.csv``, a table that a sequence can play.
 
     Attributes
     ----------
@@ -106,53 +109,16 @@ class Inversion:
         """
         return signal_figure("actuator", self.time, self.voltage, self.target, self.response)
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the voltage as a table that a sequence can play.
+    def _writers(self) -> Writers:
+        def table(out: Path, overwrite: bool) -> None:
+            rows = np.column_stack([self.time, self.voltage])
+            with replaced_when_done(out, overwrite) as partial:
+                np.savetxt(partial, rows, fmt="%.12g", delimiter=",", header="time_s,voltage_V",
+                           comments="")  # fmt: skip
 
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.csv``; the columns are ``time_s`` and ``voltage_V``.
-        overwrite : bool
-            Replace a file that exists.
+        return {".csv": ("the voltage, as a table that a sequence can play", table)}
 
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        out = check_output(path, overwrite)
-        if out.suffix != ".csv":
-            raise InputError(f"{path}: the voltage is a table; end the name in .csv")
-        table = np.column_stack([self.time, self.voltage])
-        with replaced_when_done(out, overwrite) as partial:
-            np.savetxt(partial, table, fmt="%.12g", delimiter=",", header="time_s,voltage_V",
-                       comments="")  # fmt: skip
-        return out
-
-    def to_html(self, path: str | Path) -> Path:
-        """Write a page with the main facts and a figure.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_page(path, self.name, "Voltage for a target", self._repr_html_())
 
     def __repr__(self) -> str:
@@ -171,8 +137,8 @@ class Inversion:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TrackResult:
-    """Result of following a target.
+class TrackResult(HasFiles, HasPage):
+    """Result of following a target, saved as ``.json`` (all numbers).
 
     Attributes
     ----------
@@ -222,51 +188,11 @@ class TrackResult:
             raise InputError(f"{what!r} cannot be plotted; what can is runs, errors")
         return (runs_figure if what == "runs" else errors_figure)(self.outcome)
 
-    def to_html(self, path: str | Path) -> Path:
-        """Write the report.
-
-        Parameters
-        ----------
-        path : str or Path
-            The page, which works offline; a file that exists is replaced.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+    def _write_page(self, path: Path) -> Path:
         return write_track_report(self.outcome, path)
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write all numbers.
-
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.json``.
-        overwrite : bool
-            Replace a file that exists.
-
-        Returns
-        -------
-        Path
-            The path that was written.
-
-        Raises
-        ------
-        InputError
-            If the file exists, cannot be written, or has another ending.
-        """
-        out = check_output(path, overwrite)
-        if out.suffix != ".json":
-            raise InputError(f"{path}: all numbers are written as JSON; end the name in .json")
-        write_json(track_json(self.outcome), out)
-        return out
+    def _writers(self) -> Writers:
+        return {".json": ("all numbers", lambda out, _: write_json(track_json(self.outcome), out))}
 
     def __repr__(self) -> str:
         """Return the summary in sentences."""

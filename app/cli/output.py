@@ -169,7 +169,7 @@ def working(
 
     if computes:
         announce_compilation()
-    with progress("dearig", whole=whole) as report:
+    with progress("dearig", whole=whole, computes=computes) as report:
         yield console_for(json), report
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from datetime import timedelta
 
 from rich.console import Console
@@ -38,14 +38,14 @@ def _clock(seconds: float) -> str:
 
 @contextmanager
 def progress(
-    description: str, console: Console | None = None, whole: bool = False
+    description: str, console: Console | None = None, whole: bool = False, computes: bool = False
 ) -> Iterator[Callable[[str, float], None]]:
     """Show a progress bar on standard error while the body runs.
 
     Gives a callback ``(stage, fraction)`` with the fraction of that stage that is done. The bar
     restarts with every stage; the elapsed time does not. With ``whole`` the fraction is of all the
-    work, and a new stage only changes the bar's text. Nothing is written where standard error is
-    no terminal.
+    work, and a new stage only changes the bar's text. With ``computes`` the text counts the kernels
+    while any are compiled. Nothing is written where standard error is no terminal.
     """
     console = PrintableConsole(stderr=True) if console is None else console
     if not console.is_terminal:
@@ -82,8 +82,18 @@ def progress(
             bar.tasks[0].start_time = began
         bar.update(task, completed=done)
 
-    with bar:
+    def compiled(ready: int, needed: int) -> None:
+        words = f"compiling, kernel {ready} of {needed}" if ready < needed else current
+        bar.update(task, description=f"{description}: {words}" if words else description)
+
+    with bar, _kernels_counted(compiled) if computes else nullcontext():
         yield report
+
+
+def _kernels_counted(report: Callable[[int, int], None]) -> AbstractContextManager[None]:
+    from dearig.acquisition.compilation import compilation_reported
+
+    return compilation_reported(report)
 
 
 def _unseen(stage: str, fraction: float) -> None:  # noqa: ARG001

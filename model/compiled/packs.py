@@ -21,7 +21,7 @@ from numba.extending import lower_builtin, models, register_model
 
 from dearig.model.compiled.jit import INTO_CALLER
 
-__all__ = ["WIDTH", "Pack", "first", "lane", "of_packs", "rows", "spread", "with_lane"]
+__all__ = ["WIDTH", "Pack", "first", "lane", "larger", "of_packs", "rows", "spread", "with_lane"]
 
 WIDTH = 4  #: films in a pack
 
@@ -239,3 +239,24 @@ def _first_in_pack(number: float) -> float:
 def first(number: float) -> float:
     """Return the ``number`` of a pack's first film; ``number`` itself of one film."""
     return number
+
+
+@intrinsic
+def _larger(_typing: Any, one: Any, other: Any) -> Any:
+    def code(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+        below = builder.fsub(ir.Constant(_VECTOR, [0.0] * WIDTH), args[1])
+        size = builder.select(builder.fcmp_ordered(">", below, args[1]), below, args[1])
+        # of a size that is no number the comparison is false, as of one film
+        return builder.select(builder.fcmp_ordered(">", size, args[0]), size, args[0])
+
+    return _PACK(one, other), code
+
+
+def _larger_in_pack(one: float, other: float) -> float:
+    return _larger(one, other)
+
+
+@of_packs(_larger_in_pack)
+def larger(one: float, other: float) -> float:
+    """Return the larger of ``one`` and the size of an ``other`` number, for each film of a pack."""
+    return max(one, abs(other))

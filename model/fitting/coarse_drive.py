@@ -9,6 +9,7 @@ comes from the full drive.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class CoarseDrive(Drive):
 
     to: np.ndarray
 
-    @property
+    @cached_property
     def ends(self) -> np.ndarray:
         """``to``."""
         return self.to

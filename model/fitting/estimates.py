@@ -128,7 +128,8 @@ def estimates_with_intervals(
     # other valleys count as one more
     shares = layout.size + 1
     estimates = []
-    for place in (*np.flatnonzero(~bent), *np.flatnonzero(bent)):
+    # a better point, if there is one, shows first where the data fix least
+    for place in (*np.flatnonzero(bent), *np.flatnonzero(~bent)):
         j = int(place)
         q, value = layout.quantities[j], float(values[j])
         if q.is_fixed:

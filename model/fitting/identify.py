@@ -67,6 +67,7 @@ _COARSE_SAMPLES = 1500  # of a film record
 _MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
 _LEADERS = 2  # starts that are followed to their ends
+_RESOLVED = 0.2  # of a mean's interval: the shortest relaxation time of a search on means
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
 # Of an interval's width, which means and quicker steps may change: it changes a coverage of 95 %
 # by a quarter of a per cent
@@ -194,7 +195,12 @@ def add_intervals(
         try:
             found = _intervals(problem, layout.initial(), held, progress, gain, ended)
         except BetterPoint as better:
-            fit = descend(problem, better.x, held, damping=1e-4)
+            x = better.x
+            if isinstance(layout.base, Actuator):
+                means = coarse_problem(problem, corrected=True)
+                x = _descend_on_means(problem, means, x, held)
+                simulations += means.simulations
+            fit = descend(problem, x, held, damping=1e-4)
             here = problem.costs(layout.coordinates(layout.initial())[None])[0]
             if fit.cost < here:
                 fitted = _result(
@@ -426,15 +432,16 @@ def fit_globally(
             counted(count, cost)
 
     problem.on_simulations = on_all_readings
+    scouts = _of_resolved_times(coarse) if driven_by_voltage else coarse
     fits = []
     for start in starts:
-        fits.append(descend(coarse, start, first, iterations=_SCOUT_ITERATIONS))
+        fits.append(descend(scouts, start, first, iterations=_SCOUT_ITERATIONS))
         descents.ended()
     # not one, because the best after a few steps is not always the best at the end
     ranked = sorted(fits, key=lambda f: f.cost)
     ends = []
     for leader in ranked[:_LEADERS]:
-        ends.append(descend(coarse, leader.x, first))
+        ends.append(descend(scouts, leader.x, first))
         descents.ended()
     x = min(ends, key=lambda f: f.cost).x
     reached = [(f.cost, True) for f in ends] + [(f.cost, False) for f in ranked[_LEADERS:]]
@@ -453,7 +460,25 @@ def fit_globally(
     problem.on_simulations = counted
     progress("descents", 1.0)
     problem.simulations += coarse.simulations
+    if scouts is not coarse:
+        problem.simulations += scouts.simulations
     return replace(fit, starts=tuple(sorted(reached))), first
+
+
+def _of_resolved_times(means: Problem) -> Problem:
+    """Return the problem on ``means`` without relaxation times that they do not resolve.
+
+    To means a branch so fast is a drag, with any time; and it makes the film stiff.
+    """
+    layout = copy(means.layout)
+    layout.lower = layout.lower.copy()
+    step = min(float(np.median(np.diff(r.time))) for r in means.records)
+    times = layout.column("T")
+    least = np.maximum(layout.lower[times], math.log(_RESOLVED * step))
+    layout.lower[times] = np.minimum(least, layout.upper[times])
+    found = copy(means)
+    found.layout = layout
+    return found
 
 
 def _descend_on_means(

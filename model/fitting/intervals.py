@@ -244,43 +244,49 @@ class _Path:
 
 
 def _path(
-    problem: Problem, best: np.ndarray, j: np.ndarray, others: np.ndarray, index: int
+    problem: Problem,
+    best: np.ndarray,
+    residuals: np.ndarray,
+    j: np.ndarray,
+    slope: np.ndarray,
+    others: np.ndarray,
+    index: int,
 ) -> _Path:
-    """Return the path of coordinate ``index``; ``j`` (N, f) is the Jacobian of ``others``."""
+    """Return the path of coordinate ``index`` from ``best`` (d,).
+
+    ``residuals`` (N,) are those there, ``j`` (N, f) is the Jacobian of the ``others``
+    (d,) bool, ``slope`` (N,) its own column.
+    """
     layout = problem.layout
     inverse = _pseudo_inverse(j.T @ j)
-    probe = layout.differences(best)[index]
     first, second = np.zeros(layout.size), np.zeros(layout.size)
     first[index] = 1.0
-    sides = np.clip(best + np.outer((-probe, probe), first), layout.lower, layout.upper)
-    slope = np.diff(problem.scaled(layout.values(sides)), axis=0)[0] / max(
-        np.ptp(sides[:, index]), 1e-300
-    )
     first[others] = -inverse @ (j.T @ slope)
     left = slope + j @ first[others]
     sigma = 1.0 / max(math.sqrt(float(left @ left)), 1e-150)
     # wide enough to resolve the curvature, and still local
     probe = min(0.1 * sigma, *(0.05 * layout.reach(best) / np.maximum(np.abs(first), 1e-300)))
-    three = best + np.outer((-probe, 0.0, probe), first)
-    if np.all((three >= layout.lower) & (three <= layout.upper)):
-        bend = np.diff(problem.scaled(layout.values(three)), 2, axis=0)[0] / probe**2
+    sides = best + np.outer((-probe, probe), first)
+    if others.any() and np.all((sides >= layout.lower) & (sides <= layout.upper)):
+        _, (below, above) = problem.evaluate(sides)
+        bend = ((above - residuals) - (residuals - below)) / probe**2
         second[others] = -inverse @ (j.T @ bend)
     return _Path(index, best, first, second, sigma)
 
 
 def _guess(
     problem: Problem, path: _Path, point: float, held: np.ndarray, reach: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """Return parameters (d,) from which the refit at ``point`` starts, and their cost."""
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return parameters (d,) from which the refit at ``point`` starts; their cost, residuals."""
     layout = problem.layout
     moved = path.start + np.clip(path.ahead(point) - path.start, -reach, reach)
     moved = np.where(held, path.start, np.clip(moved, layout.lower, layout.upper))
     # where the data hardly determine the others, the path is wrong: try them unmoved too
     both = np.stack([moved, path.start])
     both[:, path.index] = point
-    costs = problem.costs(both)
+    costs, residuals = problem.evaluate(both)
     better = int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))
-    return both[better], float(costs[better])
+    return both[better], float(costs[better]), residuals[better]
 
 
 def profile(
@@ -305,11 +311,15 @@ def profile(
     optimum by more than ``gain``.
     """
     layout = problem.layout
-    fixed = held.copy()
-    fixed[index] = True
+    own = np.arange(layout.size) == index
+    fixed = held | own
     threshold = CHI2_95 * inflation
     others = ~fixed
-    centre = _path(problem, best, jac[:, others[~held]], others, index)
+    # one that is freed for its own end is not in the Jacobian
+    moved = problem.jacobian(best, own) if held[index] else jac[:, ~others[~held]]
+    centre = _path(
+        problem, best, problem.residuals(best), jac[:, others[~held]], moved[:, 0], others, index
+    )
     reach = layout.reach(best)
     ends = {-1.0: -math.inf, 1.0: math.inf}
     for sign in sides:
@@ -327,7 +337,7 @@ def profile(
                 point = float(
                     np.clip(inside + sign * step * part, layout.lower[index], layout.upper[index])
                 )
-                guess, cost = _guess(problem, path, point, held, reach)
+                guess, cost, residuals = _guess(problem, path, point, held, reach)
                 if cost * problem.samples - chi2 < _GUESS_MAX * threshold:
                     break
             at_bound = sign * (point - bound) >= 0.0
@@ -343,20 +353,26 @@ def profile(
                 damping=1e-5,
                 patience=2,
                 quick=True,
+                straight=True,
+                known=residuals,
+                beside=own,
             )
             if chi2 - fit.cost * problem.samples > gain:
                 raise BetterPoint(fit.x, chi2 - fit.cost * problem.samples)
             excess = fit.cost * problem.samples - fit.to_gain - chi2
             z = math.sqrt(max(excess, 0.0) / threshold)
-            if abs(z - 1.0) < near:
-                end = point
+            if abs(z - 1.0) < near and z > z_inside:
+                # the root of chi-square is nearly linear here
+                end = inside + (point - inside) * (1.0 - z_inside) / (z - z_inside)
+                end = float(np.clip(end, layout.lower[index], layout.upper[index]))
                 break
             if z < 1.0:
                 if at_bound or step_before == 0.0:
                     break
                 slope = (z - z_inside) / step_before
                 inside, z_inside = point, z
-                path = _path(problem, fit.x, fit.jacobian, others, index)
+                column = np.zeros(fit.residuals.size) if fit.beside is None else fit.beside[:, 0]
+                path = _path(problem, fit.x, fit.residuals, fit.jacobian, column, others, index)
                 step = (1.0 - z) / slope if slope > 0.0 else reach[index]
                 step = min(step, 4.0 * step_before, reach[index])
             else:

@@ -27,9 +27,10 @@ class LocalFit:
 
     ``jacobian`` (N, f) over the free coordinates is that of the last iteration: at ``x`` where the
     descent converged, else one step before. ``to_gain`` is what the quadratic model at ``x`` would
-    still take off chi-square, 0 where there is none at ``x``. ``starts`` are those of the global
-    search that led here, best first: the cost that each reached, and whether it was followed to its
-    end.
+    still take off chi-square, 0 where there is none at ``x``. ``beside`` (N, b) are the columns of
+    other parameters where ``jacobian`` is, as far as they were asked for. ``starts`` are those of
+    the global search that led here, best first: the cost that each reached, and whether it was
+    followed to its end.
     """
 
     x: np.ndarray
@@ -39,6 +40,7 @@ class LocalFit:
     iterations: int
     converged: bool
     to_gain: float = 0.0
+    beside: np.ndarray | None = None
     starts: tuple[tuple[float, bool], ...] = ()
 
 
@@ -51,6 +53,9 @@ def descend(
     damping: float = 1e-2,
     patience: int = _PATIENCE,
     quick: bool = False,
+    straight: bool = False,
+    known: np.ndarray | None = None,
+    beside: np.ndarray | None = None,
 ) -> LocalFit:
     """Minimise least squares from ``start`` (d,), inside the layout's bounds: one loop, one state.
 
@@ -65,12 +70,18 @@ def descend(
     the residuals are far above the noise. ``damping`` is the first one, relative to the
     scaled curvature; near an optimum it may be small. ``quick`` takes one-sided differences at
     half the cost; they blur only the difference of two branches of nearly equal relaxation times.
+    ``straight`` is for a start next to the optimum: steps have no second order, and the Jacobian of
+    a step tells how much gain the step left. ``known`` are the residuals (N,) at ``start``, None
+    where they are to be computed. ``beside`` (d,) bool are ``fixed`` parameters whose derivatives
+    are asked for with the others.
     """
     layout = problem.layout
     free = np.ones(layout.size, dtype=bool) if fixed is None else ~fixed
     x = np.clip(start, layout.lower, layout.upper)
-    r = problem.residuals(x)
+    r = problem.residuals(x) if known is None else known
     chi2 = float(r @ r)
+    asked = free if beside is None else free | beside
+    whole = np.zeros((r.size, int(asked.sum())))
     scale = np.zeros(int(free.sum()))
     jac = np.zeros((r.size, scale.size))
     history = [chi2]
@@ -78,7 +89,8 @@ def descend(
     done, to_gain = 0, 0.0
     while done < iterations and not converged:
         done += 1
-        jac = problem.jacobian(x, free, r if quick else None)
+        whole = problem.jacobian(x, asked, r if quick else None)
+        jac = whole if beside is None else whole[:, free[asked]]
         normal, gradient = jac.T @ jac, jac.T @ r
         scale = np.maximum(np.sqrt(np.diag(normal)), 1e-3 * scale)
         safe = np.where(scale > 0.0, scale, 1.0)
@@ -107,24 +119,32 @@ def descend(
             steps = np.zeros((dampings.size, part.size))
             steps[:, move] = -((inverse * target) @ q.T) / safe[move]
             steps /= np.maximum(1.0, np.max(np.abs(steps) / reach, axis=1))[:, None]
-            steps += _bend(problem, x, free, r, jac, steps, move, safe, q, inverse)
+            if not straight:
+                steps += _bend(problem, x, free, r, jac, steps, move, safe, q, inverse)
             trials = np.tile(x, (dampings.size, 1))
             trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
-            costs = problem.costs(trials) * problem.samples
+            means, residuals = problem.evaluate(trials)
+            costs = means * problem.samples
             best = int(np.argmin(costs))
             if costs[best] < chi2:
                 improved = True
-                x, chi2 = trials[best], float(costs[best])
+                x, chi2, r = trials[best], float(costs[best]), residuals[best]
                 damping = max(dampings[best], _DAMPING_MIN)
             else:
                 damping *= 1e3
         if not improved:
             converged = True
             break
-        r = problem.residuals(x)
         history.append(chi2)
+        if straight:
+            target = q.T @ ((jac.T @ r) / safe)[move]
+            left = float(np.sum(target**2 / np.maximum(w, _FLAT)))
+            if left < enough:
+                converged, to_gain = True, left
+                break
         converged = len(history) > patience and history[-1 - patience] - chi2 < enough
-    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged, to_gain)
+    others = None if beside is None else whole[:, beside[asked]]
+    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged, to_gain, others)
 
 
 def gain_that_counts(chi2: float, samples: int) -> float:

@@ -31,11 +31,19 @@ class Offsets:
             if isinstance(record, ActuatorRecord):
                 self._weights.append((part, _weights(record)))
 
+    def align(self, rows: np.ndarray, readings: np.ndarray | None = None) -> None:
+        """Move ``rows`` (..., N) in m by the offset nearest to ``readings`` (N,), 0 for None."""
+        for part, weights in self._weights:
+            own = rows[..., part]
+            missing = -own if readings is None else readings[part] - own
+            missing *= weights
+            # not a matrix product, whose rounding depends on how many rows there are
+            own += missing.sum(axis=-1, keepdims=True)
+
     def nearest(self, missing: np.ndarray) -> np.ndarray:
         """Return the offset (..., N) of each reading for residuals ``missing`` (..., N) in m."""
         found = np.zeros_like(missing)
         for part, weights in self._weights:
-            # not a matrix product, whose rounding depends on how many rows there are
             found[..., part] = np.sum(missing[..., part] * weights, axis=-1, keepdims=True)
         return found
 

@@ -490,7 +490,11 @@ class FitLayout:
         for j in self.column("J"):
             k = HEAD + WIDTH * self.quantities[j].index
             kind = int(self._c[k + KIND])
-            c[:, k + LOCKING] = [locking_strain(kind, shape_at(row, k)) for row in c]
+            shape = c[:, k + LIMIT : k + SHAPE + 3]
+            alike = bool((shape == shape[0]).all())
+            c[:, k + LOCKING] = [
+                locking_strain(kind, shape_at(row, k)) for row in (c[:1] if alike else c)
+            ]
         if self._rest is not None:
             for row in c:
                 pull = nominal_pull(

@@ -38,6 +38,12 @@ def agrees(full: np.ndarray, coarse: np.ndarray) -> bool:
     return float(np.linalg.norm(coarse - full)) <= _COARSE_ERROR_MAX * float(np.linalg.norm(full))
 
 
+def _places(groups: Sequence[Sequence[int]]) -> list[range]:
+    """Return where the members of each group stand, with the groups one after the other."""
+    ends = np.cumsum([len(group) for group in groups])
+    return [range(end - len(group), end) for end, group in zip(ends, groups, strict=True)]
+
+
 class Problem:
     """Least squares of model minus measurement, in units of the noise.
 
@@ -146,17 +152,21 @@ class Problem:
         films = self._films(c, coarse)
         which = coarse[[members[0] for members in films]]
         steps = np.zeros((which.size, len(self.records)))
+        shares = self._shared_out(which, packed=self._in_packs(c[0]))
 
-        def run(jobs: list[tuple[int, int]]) -> None:
+        def run(jobs: list[tuple[list[int], int]]) -> None:
             # several jobs a call: handing them over one by one costs a part of the time
-            for film, i in jobs:
-                members = films[film]
+            for some, i in jobs:
+                members = [member for film in some for member in films[film]]
                 part = slice(self._edges[i], self._edges[i + 1])
-                out[members, part], status[members, i], steps[film, i] = self._readings(
-                    c[members], self.records[i], bool(which[film])
+                out[members, part], status[members, i], steps[some[0], i] = self._readings(
+                    c[members],
+                    self.records[i],
+                    bool(which[some[0]]),
+                    _places([films[film] for film in some]),
                 )
 
-        parallel_map(run, self._shared_out(which), self.workers)
+        parallel_map(run, shares, self.workers)
         self.simulations += steps.size
         if self.on_simulations is not None:
             self.on_simulations(steps.size, self._effort(float(steps.sum())))
@@ -167,7 +177,7 @@ class Problem:
 
     def _compared(self, out: np.ndarray) -> np.ndarray:
         """Return readings ``out`` (P, N), changed in place, as they are compared with measured."""
-        out += self._offsets.nearest(self.readings - out)
+        self._offsets.align(out, self.readings)
         if self._correction is not None:
             # the difference of two predictions with their offsets
             out += self._correction
@@ -175,11 +185,15 @@ class Problem:
             out += self.drift.nearest(self.measured - out)
         return out
 
-    def predict_neighbours(self, values: np.ndarray, coarse: bool = False) -> np.ndarray | None:
-        """Return readings (P, N) of a population ``values`` (P, d), natural, near its first member.
+    def differences(
+        self, values: np.ndarray, central: bool = False, coarse: bool = False
+    ) -> np.ndarray | None:
+        """Return differences (f, N) of the readings of a population ``values``, natural.
 
-        As of ``predict``, but in steps that all share, so that differences are smooth; with
-        ``coarse`` under the coarse drives. None where the films cannot share steps.
+        The first of ``values`` (1 + f, d) are near the others, from which it is taken off. With
+        ``central`` (1 + 2 f, d) the last f are taken off those before. All are simulated in steps
+        that they share, so that differences are smooth; with ``coarse`` under the coarse drives.
+        None where the films cannot share steps.
         """
         if not isinstance(self.layout.base, Actuator):
             return None
@@ -197,7 +211,14 @@ class Problem:
                 moved, steps[i] = readings_of_neighbours(
                     c, films, self._length, *self._drive(record, coarse), record.lag, record.time
                 )
-                found[i] = None if moved is None else record.seen(moved)
+                if moved is not None:
+                    half = len(c) // 2
+                    above, below = (moved[1 : 1 + half], moved[1 + half :])
+                    if not central:
+                        above, below = moved[1:], moved[0]
+                    above -= below
+                    # linear, so that what is compared is told of differences as of readings
+                    found[i] = record.seen(above)
 
         parallel_map(run, [[i] for i in range(len(self.records))], self.workers)
         self.simulations += len(films) * len(self.records)
@@ -206,7 +227,18 @@ class Problem:
                 len(films) * len(self.records), self._effort(float(steps.sum()), len(films))
             )
         parts = [part for part in found if part is not None]
-        return self._compared(np.concatenate(parts, axis=1)) if len(parts) == len(found) else None
+        if len(parts) < len(found):
+            return None
+        return self._differences_compared(
+            parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+        )
+
+    def _differences_compared(self, rows: np.ndarray) -> np.ndarray:
+        """Return differences ``rows`` (f, N), changed in place, as readings are compared."""
+        self._offsets.align(rows)
+        if self.drift is not None:
+            rows -= self.drift.nearest(rows)
+        return rows
 
     def _films(self, c: np.ndarray, coarse: np.ndarray) -> list[list[int]]:
         """Group members of a population ``c`` (P, C) whose films move alike, for one simulation."""
@@ -219,20 +251,34 @@ class Problem:
             films.setdefault((row.tobytes(), bool(is_coarse)), []).append(member)
         return list(films.values())
 
-    def _shared_out(self, coarse: np.ndarray) -> list[list[tuple[int, int]]]:
-        """Share out (film, record) jobs among the workers; ``coarse`` (P,) films are cheaper.
+    def _in_packs(self, c: np.ndarray) -> bool:
+        """Whether films like ``c`` (C,) are simulated several at a time."""
+        moving = any(EFFECTS[name].acts_on != "sensor" for name, _ in self.layout.base.effects)
+        return isinstance(self.layout.base, Actuator) and not moving and kernel.is_swift(c)
 
-        The longest jobs go first, each to the worker with the least load, since records differ.
+    def _shared_out(self, coarse: np.ndarray, packed: bool) -> list[list[tuple[list[int], int]]]:
+        """Share out (films, record) jobs among the workers; ``coarse`` (P,) films are cheaper.
+
+        Films of one job go through the record together, where they are ``packed``. The longest jobs
+        go first, each to the worker with the least load, since records differ.
         """
-        steps = np.array([self._steps(r) for r in self.records])
-        jobs = list(np.ndindex(coarse.size, len(self.records)))
-        jobs.sort(key=lambda job: -steps[job[1], int(coarse[job[0]])])
-        shares: list[list[tuple[int, int]]] = [[] for _ in range(min(self.workers, len(jobs)))]
+        together = WIDTH if packed else 1
+        jobs = []
+        for i, record in enumerate(self.records):
+            for is_coarse, steps in enumerate(self._steps(record)):
+                films = np.flatnonzero(coarse == bool(is_coarse)).tolist()
+                jobs += [
+                    (steps, films[begin : begin + together], i)
+                    for begin in range(0, len(films), together)
+                ]
+        jobs.sort(key=lambda job: -job[0])
+        workers = min(self.workers, len(jobs))
+        shares: list[list[tuple[list[int], int]]] = [[] for _ in range(workers)]
         loads = [0.0] * len(shares)
-        for film, i in jobs:
+        for steps, films, i in jobs:
             least = loads.index(min(loads))
-            shares[least].append((film, i))
-            loads[least] += steps[i, int(coarse[film])]
+            shares[least].append((films, i))
+            loads[least] += steps
         return shares
 
     @staticmethod
@@ -257,16 +303,21 @@ class Problem:
         turns = (1.0 + packs * WIDTH) / (1.0 + packs)
         return _POPULATION_COST + (1.0 + _EFFECT_STEP_COST * moving * turns) * steps
 
-    def _readings(self, c: np.ndarray, record: Record, coarse: bool) -> tuple[np.ndarray, int, int]:
-        """Return readings (M, N) of members ``c`` (M, C) whose films move alike; status; steps."""
+    def _readings(
+        self, c: np.ndarray, record: Record, coarse: bool, films: Sequence[Sequence[int]]
+    ) -> tuple[np.ndarray, np.ndarray | int, int]:
+        """Return readings (M, N) of members ``c`` (M, C), statuses (M,) and steps.
+
+        ``films`` are the places of members whose films move alike.
+        """
         if isinstance(record, FilmRecord):
             stress, status, _ = stress_of(c[0], record.time, record.stretch)
             return stress[None], status, record.time.size
         drive, fidelity = self._drive(record, coarse)
-        moved, status, steps = readings_of(
-            c, self._length, drive, record.lag, fidelity, record.time
+        moved, statuses, steps = readings_of(
+            c, self._length, drive, record.lag, fidelity, record.time, films
         )
-        return record.seen(moved), status, steps
+        return record.seen(moved), statuses, steps
 
     @property
     def _length(self) -> float:
@@ -382,15 +433,21 @@ class Problem:
             return self._one_sided(x, free, residuals, columns)
         steps = self.layout.differences(x, in_common=True, central=True)
         up, down = self._sides(x, free, steps)
-        near = self.predict_neighbours(self.layout.values(np.vstack([x, up, down])))
-        if near is None:
+        rows = self.differences(self.layout.values(np.vstack([x, up, down])), central=True)
+        if rows is None:
             up, down = self._sides(x, free, self.layout.differences(x))
             sides, _ = self.predict(self.layout.values(np.concatenate([up, down])))
-        else:
-            sides = near[1:]
-        width = (up - down).sum(axis=1)
-        half = width.size
-        return ((sides[:half] - sides[half:]) / self.sigma).T / width
+            rows = sides[: len(up)] - sides[len(up) :]
+        return self._over_noise(rows, (up - down).sum(axis=1))
+
+    def _over_noise(self, rows: np.ndarray, width: np.ndarray) -> np.ndarray:
+        """Return the Jacobian (N, f) by differences ``rows`` (f, N), changed, over ``width`` (f,).
+
+        A masked reading counts nothing.
+        """
+        rows /= self.sigma
+        rows /= width[:, None]
+        return rows.T
 
     def _sides(
         self, x: np.ndarray, free: np.ndarray, steps: np.ndarray
@@ -474,12 +531,15 @@ class Problem:
             which = coarse == by_coarse
             if not which.any():
                 continue
-            near = self.predict_neighbours(
-                self.layout.values(np.vstack([x, there[which]])), by_coarse
+            rows = self.differences(
+                self.layout.values(np.vstack([x, there[which]])), coarse=by_coarse
             )
-            if near is None:
+            if rows is None:
                 return self._one_by_one(x, free, residuals, coarse)
-            found[:, which] = ((near[1:] - near[0]) / self.sigma).T / steps[which]
+            part = self._over_noise(rows, steps[which])
+            if which.all():
+                return part
+            found[:, which] = part
         return found
 
     def _one_side(

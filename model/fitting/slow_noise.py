@@ -242,10 +242,9 @@ class WhitenedProblem(Problem):
         predicted, status = super().predict(values, coarse)
         return self._whitened(predicted), status
 
-    def predict_neighbours(self, values: np.ndarray, coarse: bool = False) -> np.ndarray | None:
-        """Return whitened readings (P, N), as of ``Problem``."""
-        predicted = super().predict_neighbours(values, coarse)
-        return None if predicted is None else self._whitened(predicted)
+    def _differences_compared(self, rows: np.ndarray) -> np.ndarray:
+        rows = super()._differences_compared(rows)
+        return rows if self.noise_drift is None else self.noise_drift.whitened(rows)
 
     def _whitened(self, predicted: np.ndarray) -> np.ndarray:
         if self.noise_drift is None:

@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from dearig.model.kernel.drive import drive_by_voltage
 from dearig.model.kernel.exponential_rk import is_swift
+from dearig.model.kernel.population import read_members, read_population
 from dearig.model.kernel.rest import rest_stretch
 from dearig.model.kernel.sensor import read_sensor
 from dearig.model.kernel.status import (
@@ -57,6 +58,8 @@ __all__ = [
     "ROUGH",
     "drive_by_voltage",
     "is_swift",
+    "read_members",
+    "read_population",
     "read_sensor",
     "rest_stretch",
 ]

@@ -31,8 +31,8 @@ from dearig.model.kernel.rodas import LONGEST, WORTH, cross_by_rodas
 from dearig.model.kernel.status import BAD_INPUT, CAREFUL, NOT_CONVERGED, OK
 from dearig.model.kernel.step_control import (
     DRAG_SUBSTEPS_MAX,
-    EFFECT_SUBSTEPS_MAX,
-    RINGING,
+    EVEN,
+    LOOK_EVERY,
     STIFFNESS_NEAR,
     Pace,
     Policy,
@@ -41,18 +41,24 @@ from dearig.model.kernel.step_control import (
     pace_of,
     policy_of,
     refinement,
+    steps_by_ringing,
     stiffness_at,
     stiffness_changed,
     too_stiff,
 )
 from dearig.model.kinematics import electric
 
-__all__ = ["LOG", "drive_by_voltage", "drive_with_log", "log_interval"]
+__all__ = [
+    "LOG",
+    "drive_alone",
+    "drive_by_voltage",
+    "drive_with_log",
+    "log_interval",
+    "start_ringing",
+]
 
 LOG = 3 + 2 * BRANCHES_MAX  #: numbers of an interval in a log
 
-_LOOK_EVERY = 64  # samples: the film's stiffness follows the stretch slowly
-_EVEN = 1e-6  # of an interval: so near are intervals of one length
 _DRAG_MISSED = 1.5  # of the steps taken: so many may a drag ask for after the fact
 
 
@@ -71,7 +77,7 @@ class Workspace(NamedTuple):
 
 
 @inlined
-def _start_ringing(
+def start_ringing(
     c: np.ndarray, springs: np.ndarray, y: np.ndarray, v: float, dy: np.ndarray, trace: np.ndarray
 ) -> None:
     """Let ``trace`` begin at ``y``: an acceleration there may be the start of an oscillation."""
@@ -83,26 +89,6 @@ def _start_ringing(
 def _copy(source: np.ndarray, target: np.ndarray, count: int) -> None:
     for j in range(count):
         target[j] = source[j]
-
-
-@inlined
-def _steps_by_ringing(
-    policy: Policy,
-    film: Stiffness,
-    pace: Pace,
-    dt: float,
-    jump: float,
-    ringing: float,
-    hasty: bool,
-) -> int:
-    """Return how many exponential steps an interval takes, so that they resolve what must be."""
-    fine = pace.steps
-    if policy.fine_only:
-        fine = pace.calm_steps if hasty else pace.steps * refinement(pace, jump, ringing)
-    elif not policy.coarse and max(ringing * pace.fading, abs(jump)) > RINGING * film.springs:
-        finer = film.omega * dt / policy.phase_max
-        fine = max(fine, math.ceil(min(finer - 1e-6, EFFECT_SUBSTEPS_MAX)))
-    return fine
 
 
 @inlined
@@ -222,12 +208,12 @@ def _follow(
             break
         # the pace for this interval, section 7
         if fresh:
-            _start_ringing(c, springs, y, v0, room.work[0], trace)
+            start_ringing(c, springs, y, v0, room.work[0], trace)
             ringing, fresh = abs(trace[0]), False
-        if k and k % _LOOK_EVERY == 0:
+        if k and k % LOOK_EVERY == 0:
             film, lam_seen = stiffness_at(policy, acting, c, y, time[k], branches), y[0]
             dt_paced = 0.0
-        if abs(dt - dt_paced) > _EVEN * dt:
+        if abs(dt - dt_paced) > EVEN * dt:
             pace, dt_paced = pace_of(policy, film, dt), dt
         explicit, fine = pace.explicit, 0
         if explicit:
@@ -247,7 +233,7 @@ def _follow(
                 if policy.watched and not film.steep:
                     excited = max(ringing * pace.fading, abs(jump - jump_before))
                     hasty = excited < policy.calm_below * film.springs
-                fine = _steps_by_ringing(policy, film, pace, dt, jump, ringing, hasty)
+                fine = steps_by_ringing(policy, film, pace, dt, jump, ringing, hasty)
                 treads = treads and policy.fine_only
                 change = 0.0
                 # a jump cannot carry the film on faster than springs let it oscillate
@@ -306,7 +292,7 @@ def _follow(
 
 
 @allocating
-def _drive(
+def drive_alone(
     c: np.ndarray,
     time: np.ndarray,
     voltage: np.ndarray,
@@ -389,4 +375,4 @@ def drive_with_log(
     entered in ``log`` (N, LOG), see ``log_interval``; it may be (0, LOG).
     """
     drive = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
-    return _drive(c, *drive, y, stretch, rate, fidelity, others, log)
+    return drive_alone(c, *drive, y, stretch, rate, fidelity, others, log)

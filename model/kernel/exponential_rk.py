@@ -20,7 +20,7 @@ from dearig.model.coefficients import (
 )
 from dearig.model.compiled.jit import allocating, inlined, jit
 from dearig.model.compiled.packs import first as first_film
-from dearig.model.compiled.packs import spread
+from dearig.model.compiled.packs import larger, spread
 from dearig.model.effects import MEMORY
 from dearig.model.film.network import HEAD, branch_count
 from dearig.model.kernel.effect_forces import COMMIT
@@ -101,7 +101,8 @@ def film_steps(
     c: np.ndarray,
     memory: np.ndarray,
     table: np.ndarray,
-    branches: np.ndarray,
+    gives: np.ndarray,
+    flows: np.ndarray,
     propagator: np.ndarray,
     y: np.ndarray,
     origin: float,
@@ -116,9 +117,11 @@ def film_steps(
 ) -> None:
     """Take the steps of ``exponential_steps``: one compiled kernel, all of it in registers.
 
-    It carries one film, or a pack of films (``dearig.model.compiled.packs``): then ``y`` and
-    ``table`` are rows of packs, and ``c`` and ``memory`` are as ``lane_forces`` has them. The
-    stretches in ``y``, of film and branches, are counted from ``origin``.
+    ``gives`` and ``flows`` are the rows of ``branches``. It carries one film, or a pack of films
+    (``dearig.model.compiled.packs``): then ``y``, ``table`` and ``trace`` are rows of packs, and
+    ``c`` and ``memory`` are as ``lane_forces`` has them. The films of a pack share ``gives``,
+    ``flows`` and ``propagator``, or have their own: rows of packs. The stretches in ``y``, of film
+    and branches, are counted from ``origin``.
     """
     # One piece: the stages share some sixty numbers, which calls would send through memory.
     # Sections and names are those of EXPONENTIAL.md: (z, v, i) is u of section 2
@@ -145,12 +148,12 @@ def film_steps(
     )  # fmt: skip
     faded_half, faded = propagator[FADED_HALF], propagator[FADED]
     left_half, left = 1.0 - relaxation * faded_half, 1.0 - relaxation * faded
-    s1, s2, s3 = branches[1, 0], branches[1, 1], branches[1, 2]
+    s1, s2, s3 = flows[0], flows[1], flows[2]
     # I_0 of section 2: at the start of a step the mean of the pulls on the branches, so weighted
-    per_mean = -propagator[INVERSE_COUPLING] * propagator[INVERSE_RELAXATION]
-    i1 = per_mean * branches[0, 0] * r1
-    i2 = per_mean * branches[0, 1] * r2
-    i3 = per_mean * branches[0, 2] * r3
+    per_mean = -1.0 * propagator[INVERSE_COUPLING] * propagator[INVERSE_RELAXATION]
+    i1 = per_mean * gives[0] * r1
+    i2 = per_mean * gives[1] * r2
+    i3 = per_mean * gives[2] * r3
     l1, l2, l3 = s1 * relaxation, s2 * relaxation, s3 * relaxation
     s1p, s2p, s3p = s1 * p3, s2 * p3, s3 * p3
     # sums of small steps: counted from an origin nearby, they round less
@@ -162,7 +165,7 @@ def film_steps(
     half, sixth = 0.5 * h, h / 6.0
     per_half = 1.0 / half
     dv = (v1 - v0) / steps
-    last, last_but_one, bend = trace[0], trace[1], 0.0
+    last, last_but_one, bend = trace[0], trace[1], spread(0.0, moved)
     slow = fast = abs(first_film(speed))
     due = 0
     for m in range(steps):
@@ -191,9 +194,8 @@ def film_steps(
         a += load
         if m == due:
             due += stride
-            met = first_film(a)
-            bend = max(bend, abs(met - 2.0 * last + last_but_one))
-            last_but_one, last = last, met
+            bend = larger(bend, a - 2.0 * last + last_but_one)
+            last_but_one, last = last, a
         inner = i1 * t1 + i2 * t2 + i3 * t3
         f1, f2, f3 = r1 * t1 + l1 * inner, r2 * t2 + l2 * inner, r3 * t3 + l3 * inner
         first = a + (d * speed - w * inner)
@@ -313,7 +315,7 @@ def film_steps(
         moved3 += sixth * (sum_3 + r3 * t3 - (s3 * went + f3 * left)) + s3 * gave + f3 * faded
         x1, x2, x3 = origin + moved1, origin + moved2, origin + moved3
     trace[0], trace[1], trace[2] = last, last_but_one, bend
-    trace[3], trace[4] = slow, fast
+    trace[3], trace[4] = spread(slow, moved), spread(fast, moved)
     y[0], y[1] = moved, speed
     if n > 0:
         y[2] = moved1
@@ -343,8 +345,8 @@ def _steps_with_effects(
     n = y.shape[0] - MEMORY
     film_steps(
         acting,
-        c, y[n:], table, branches, propagator, y[:n], 0.0, v0, v1, t0, warmth, h, steps, stride,
-        trace,
+        c, y[n:], table, branches[0], branches[1], propagator, y[:n], 0.0, v0, v1, t0, warmth, h,
+        steps, stride, trace,
     )  # fmt: skip
 
 
@@ -382,6 +384,6 @@ def exponential_steps(
         n = y.shape[0] - MEMORY
         film_steps(
             0,
-            c, y[n:], table, branches, propagator, y[:n], 0.0, v0, v1, t0, warmth, h, steps, stride,
-            trace,
+            c, y[n:], table, branches[0], branches[1], propagator, y[:n], 0.0, v0, v1, t0, warmth,
+            h, steps, stride, trace,
         )  # fmt: skip

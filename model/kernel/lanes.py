@@ -61,8 +61,8 @@ def _carry_plain(
 ) -> None:
     # without effects their coefficients and memory are not read
     film_steps(
-        0, table, table, rows(table), branches, propagator, rows(y), rows(origin)[0], v0, v1, t,
-        0.0, h, steps, steps, trace,
+        0, table, table, rows(table), branches[0], branches[1], propagator, rows(y),
+        rows(origin)[0], v0, v1, t, 0.0, h, steps, steps, rows(trace),
     )  # fmt: skip
 
 
@@ -87,8 +87,8 @@ def _carry(
 ) -> None:
     films: Any = Lanes(values, acting)
     film_steps(
-        moving, films, memory, rows(table), branches, propagator, rows(y), rows(origin)[0], v0, v1,
-        t, warmth, h, steps, steps, trace,
+        moving, films, memory, rows(table), branches[0], branches[1], propagator, rows(y),
+        rows(origin)[0], v0, v1, t, warmth, h, steps, steps, rows(trace),
     )  # fmt: skip
 
 
@@ -188,7 +188,7 @@ def _drive(
     return _follow(
         values, acting, memory, tables, y, origin, time, voltage, ends, air, log,
         np.zeros((PROPAGATORS, PROPAGATOR)), np.zeros((2, BRANCHES_MAX)), np.empty((7, 3, 3)),
-        np.zeros(5), moved, rate,
+        np.zeros((5, WIDTH)), moved, rate,
     )  # fmt: skip
 
 

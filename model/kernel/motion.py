@@ -26,6 +26,8 @@ from dearig.model.kinematics import electric, electric_slope, strain_and_pull
 from dearig.model.springs import SPRINGS, Shape
 
 __all__ = [
+    "LONGEST",
+    "SHORTEST",
     "STIFFENING",
     "STRETCH_MAX",
     "admissible",
@@ -41,8 +43,8 @@ _NEO_HOOKEAN = SPRINGS.index("neo-hookean")
 _LOCKED = 0.9  # of the locking strain: a film that fails beyond it is locked
 
 # rows of the spring table behind those of ``dearig.model.coefficients``
-_SHORTEST = WIDTH
-_LONGEST = WIDTH + 1
+SHORTEST = WIDTH  #: row of the spring table: least stretch short of locking
+LONGEST = WIDTH + 1  #: the same: the greatest
 STIFFENING = WIDTH + 2  #: row of the spring table: 1/J, 0 for a neo-Hookean spring
 
 
@@ -166,8 +168,8 @@ def spring_table(c: np.ndarray) -> np.ndarray:
         k = HEAD + WIDTH * i
         for m in range(WIDTH):
             table[m, i] = c[k + m]
-        table[_SHORTEST, i] = _locking_stretch(held, c[k + LOCKING], -1.0)
-        table[_LONGEST, i] = _locking_stretch(held, c[k + LOCKING], 1.0)
+        table[SHORTEST, i] = _locking_stretch(held, c[k + LOCKING], -1.0)
+        table[LONGEST, i] = _locking_stretch(held, c[k + LOCKING], 1.0)
         table[STIFFENING, i] = 0.0 if c[k + KIND] == _NEO_HOOKEAN else 1.0 / c[k + LIMIT]
     return table
 
@@ -176,8 +178,8 @@ def spring_table(c: np.ndarray) -> np.ndarray:
 def admissible(springs: np.ndarray, y: np.ndarray) -> bool:
     """True when every stretch is positive and finite and no spring is locked."""
     lam = y[0]
-    good = springs[_SHORTEST, 0] < lam < springs[_LONGEST, 0] and math.isfinite(y[1])
+    good = springs[SHORTEST, 0] < lam < springs[LONGEST, 0] and math.isfinite(y[1])
     for i in range(1, springs.shape[1]):
         xi = y[1 + i]
-        good = good and springs[_SHORTEST, i] * xi < lam < springs[_LONGEST, i] * xi
+        good = good and springs[SHORTEST, i] * xi < lam < springs[LONGEST, i] * xi
     return good

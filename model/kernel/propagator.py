@@ -121,7 +121,7 @@ def propagator_for(
 ) -> int:
     """Return the row of ``propagators`` for a film so stiff, filled where it was not.
 
-    ``propagators`` is (PROPAGATORS, PROPAGATOR), ``branches`` is ``network_stiffness``'s, ``phi``
+    ``propagators`` is (n, PROPAGATOR), ``branches`` is ``network_stiffness``'s, ``phi``
     (7, 3, 3) is room. Stiffnesses are told apart by ``grain`` 1/s^2; the ``current`` row is kept
     where it is near enough. A row is found again by a hash of what it was made of.
     """
@@ -130,7 +130,7 @@ def propagator_for(
     if not is_propagator_of(propagators[row], stiffness, 0.5 * grain, group, h):
         level = max(math.floor(stiffness / grain), 1.0)
         middle = (level + 0.5) * grain
-        row = (int(level) + 37 * fine + 101 * group) % PROPAGATORS
+        row = (int(level) + 37 * fine + 101 * group) % propagators.shape[0]
         if not is_propagator_of(propagators[row], middle, 0.0, group, h):
             fill_propagator(middle, drag, branches, h, phi, propagators[row])
     return row

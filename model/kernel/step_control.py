@@ -23,7 +23,8 @@ from dearig.model.kernel.status import CAREFUL, COARSE, QUICK, ROUGH
 __all__ = [
     "DRAG_SUBSTEPS_MAX",
     "EFFECT_SUBSTEPS_MAX",
-    "RINGING",
+    "EVEN",
+    "LOOK_EVERY",
     "STIFFNESS_NEAR",
     "Pace",
     "Policy",
@@ -32,6 +33,7 @@ __all__ = [
     "pace_of",
     "policy_of",
     "refinement",
+    "steps_by_ringing",
     "stiffness_at",
     "stiffness_changed",
 ]
@@ -63,11 +65,13 @@ _TAKEN_UP = 3.0  # time constants of a drag, after which it has slowed the film 
 #: Between the least drag of a sample (0) and the largest (1): the one in closed form. With it the
 #: error was the smallest over linear, quadratic and power-law drags.
 _DRAG_HIGH = 0.7
-RINGING = 1e-4  #: in stretch, from which on steps must resolve it: 7.5 um on 75 mm
+_RINGING = 1e-4  # in stretch, from which on steps must resolve it: 7.5 um on 75 mm
 _CALM = 2e-5  # in stretch, up to which effects that soften need not resolve it
 _STEEP = 0.05  # of the stiffness: softening effects that change it by more are resolved anyway
 #: Of the stiffness: so near need that of a closed form be. The difference is integrated.
 STIFFNESS_NEAR = 0.005
+LOOK_EVERY = 64  #: samples: the film's stiffness follows the stretch slowly
+EVEN = 1e-6  #: of an interval: so near are intervals of one length
 
 
 class Policy(NamedTuple):
@@ -139,7 +143,7 @@ def policy_of(own: int, acting: int, exponential: bool, fidelity: int) -> Policy
         EFFECT_SUBSTEPS_MAX if moves else most,
         longest,
         _ROUGH_PHASE_MAX if fidelity == ROUGH else _PHASE_MAX,
-        RINGING if fidelity == ROUGH else _CALM,
+        _RINGING if fidelity == ROUGH else _CALM,
     )
 
 
@@ -253,3 +257,23 @@ def drag_between(
     moved = max(fast * min(dt, _TAKEN_UP / most), near)
     allowed = max(_DRAG_CHANGE * math.sqrt(math.sqrt(near / moved)), _DRAG_CHANGE_LEAST)
     return _DRAG_HIGH * most + (1.0 - _DRAG_HIGH) * least, (most - least) * dt / allowed
+
+
+@inlined
+def steps_by_ringing(
+    policy: Policy,
+    film: Stiffness,
+    pace: Pace,
+    dt: float,
+    jump: float,
+    ringing: float,
+    hasty: bool,
+) -> int:
+    """Return how many exponential steps an interval takes, so that they resolve what must be."""
+    fine = pace.steps
+    if policy.fine_only:
+        fine = pace.calm_steps if hasty else pace.steps * refinement(pace, jump, ringing)
+    elif not policy.coarse and max(ringing * pace.fading, abs(jump)) > _RINGING * film.springs:
+        finer = film.omega * dt / policy.phase_max
+        fine = max(fine, math.ceil(min(finer - 1e-6, EFFECT_SUBSTEPS_MAX)))
+    return fine

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -91,7 +93,7 @@ class Drive:
             if values is not None and values.shape != self.time.shape:
                 raise ModelError(f"{values.size} {what} at {self.time.size} times")
 
-    @property
+    @cached_property
     def ends(self) -> np.ndarray:
         """Voltages (N,) at the end of what follows each sample, as the kernel takes them."""
         return ends_of(self.voltage, self.hold)
@@ -282,11 +284,16 @@ def at_rest(c: np.ndarray, drive: Drive | None = None) -> tuple[int, float]:
 
     The air is that of the start of ``drive``, or the reference. It is entered too.
     """
-    c[at.AIR_TEMPERATURE] = (drive.temperature if drive else None) or 0.0
-    c[at.AIR_HUMIDITY] = (drive.humidity if drive else None) or 0.0
+    _enter_air(c, drive)
     status, rest = kernel.rest_stretch(c, 0.0)
     c[at.REST] = rest
     return status, rest
+
+
+def _enter_air(c: np.ndarray, drive: Drive | None) -> None:
+    """Enter the air at the start of ``drive`` in coefficients ``c`` (C, ...)."""
+    c[at.AIR_TEMPERATURE] = (drive.temperature if drive else None) or 0.0
+    c[at.AIR_HUMIDITY] = (drive.humidity if drive else None) or 0.0
 
 
 def initial_state(c: np.ndarray, rest: float) -> np.ndarray:
@@ -312,8 +319,8 @@ def reading_of(
     At ``times`` (N,) s, those of the drive where none are given. ``lag`` s is the known age of a
     reading, ``fidelity`` as the kernel has it. What the model did not reach reads 0.
     """
-    readings, status, _ = readings_of(c[None], length, drive, lag, fidelity, times)
-    return readings[0], status
+    readings, statuses, _ = readings_of(c[None], length, drive, lag, fidelity, times)
+    return readings[0], int(statuses[0])
 
 
 def readings_of(
@@ -323,28 +330,27 @@ def readings_of(
     lag: float = 0.0,
     fidelity: int = kernel.CAREFUL,
     times: np.ndarray | None = None,
-) -> tuple[np.ndarray, int, int]:
-    """``(readings, status, steps)`` of coefficient vectors ``cs`` (P, C) of one film: (P, N) m.
+    films: Sequence[Sequence[int]] | None = None,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """``(readings, statuses, steps)`` of coefficient vectors ``cs`` (P, C): (P, N) m, and (P,).
 
-    They differ in ``dearig.model.effects.SENSOR_COLUMNS`` alone: in how the sensor reads the
-    film, which moved in ``steps`` steps. The rest is as in ``reading_of``.
+    ``films`` are the places in ``cs`` of members of one film, which differ in
+    ``dearig.model.effects.SENSOR_COLUMNS`` alone: in how the sensor reads it. None where each has
+    its own. They moved in ``steps`` steps. The rest is as in ``reading_of``.
     """
     times = drive.time if times is None else times
-    c = cs[0].copy()
-    readings, steps = np.zeros((len(cs), times.size)), 0
-    status, rest = at_rest(c, drive)
-    if status == kernel.OK:
-        x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
-        status, _, steps = kernel.drive_by_voltage(
-            c, drive.time, drive.voltage, drive.ends, drive.air,
-            initial_state(c, rest), x, u, fidelity,
-        )  # fmt: skip
-        x -= rest
-        x *= length
-        u *= length
-        speed = np.zeros(times.size)
-        at_sensor(drive.time, x, u, times - lag, readings[0], speed)
-        readings[1:] = readings[0]
-        for one, reading in zip(cs, readings, strict=True):
-            kernel.read_sensor(one, times, reading, speed, np.zeros(SENSOR_MEMORY))
-    return readings, status, steps
+    members = cs.copy()
+    _enter_air(members.T, drive)
+    if films is None:
+        film_of = first = np.arange(len(cs))
+    else:
+        first = np.array([places[0] for places in films])
+        film_of = np.empty(len(cs), dtype=np.int64)
+        for film, places in enumerate(films):
+            film_of[places] = film
+    readings, status = np.zeros((len(cs), times.size)), np.zeros(first.size, dtype=np.int64)
+    steps = kernel.read_population(
+        members, first, film_of, length, drive.time, drive.voltage, drive.ends, drive.air, lag,
+        times, fidelity, readings, status,
+    )  # fmt: skip
+    return readings, status[film_of], steps

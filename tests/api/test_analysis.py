@@ -108,7 +108,7 @@ class TestValidate:
         numbers = json.loads(both.save(tmp_path / "v.json").read_text(encoding="utf-8"))
         assert numbers["format"].startswith("dearig-validation/")
         assert both.to_html(tmp_path / "v.html").is_file()
-        with pytest.raises(dearig.InputError, match=r"ends \.json"):
+        with pytest.raises(dearig.InputError, match=r"in \.json for all numbers"):
             both.save(tmp_path / "v.toml")
 
     def test_what_is_no_model_is_refused(self, run) -> None:

@@ -51,7 +51,8 @@ def test_a_run_says_how_near_it_came_to_the_limits(run: dearig.Recording) -> Non
 def test_a_run_prints_nothing_and_tells_its_progress(capfd: pytest.CaptureFixture[str]) -> None:
     told: list[tuple[str, float]] = []
     dearig.record(LOBE, rig_file=SLOW_RIG, progress=lambda *step: told.append(step))
-    assert told[-1] == ("recording", 1.0)
+    # where the disk is slow the rows that are still written are told as well
+    assert [step for step in told if step[0] != "writing"][-1] == ("recording", 1.0)
     assert capfd.readouterr() == ("", "")
 
 

@@ -1,8 +1,8 @@
 """Checksums of the counts of a run: CRC-32 of every block of every channel.
 
 Counts use none of HDF5's own checksum filters: a flush writes the last chunk again, and a kill in
-the middle of it would make the whole chunk unreadable, with samples of earlier flushes. Values that
-are written once, at the end, have HDF5's fletcher32.
+the middle of it would make the whole chunk unreadable, with samples of earlier flushes. Rows of a
+finished run have the Adler-32 of their deflated chunks.
 """
 
 from __future__ import annotations

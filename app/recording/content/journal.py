@@ -13,7 +13,7 @@ import os
 import struct
 import sys
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,6 +22,9 @@ import numpy as np
 from dearig.input_file import open_input
 from dearig.recording.files import journal_of, replaced_when_done
 from dearig.recording.lock import FileLock, ReplacedError
+
+#: Bytes of a page, wherever they are.
+Buffer = bytes | bytearray | memoryview
 
 __all__ = [
     "Patched",
@@ -47,7 +50,9 @@ class Patched(io.RawIOBase):
     a file that it cannot write, and crashes the program when it exits.
     """
 
-    def __init__(self, file: io.FileIO, edge: int, pages: dict[int, bytearray]) -> None:
+    def __init__(
+        self, file: io.FileIO, edge: int, pages: dict[int, bytearray | memoryview]
+    ) -> None:
         self._file = file
         self._at = 0
         self.edge = edge
@@ -110,18 +115,36 @@ class Patched(io.RawIOBase):
                 page = self.pages[number] = bytearray(self.original(number))
             low, high = max(start, number * PAGE), min(below, (number + 1) * PAGE)
             page[low - number * PAGE : high - number * PAGE] = view[low - start : high - start]
-        if stop > self.edge and self.failure is None:
+        if stop > self.edge:
             first = max(start, self.edge)
-            try:
-                self._file.seek(first)
-                rest = view[first - start :]
-                while rest:
-                    rest = rest[self._file.write(rest) :]
-            except OSError as error:
-                self.failure = error
+            self._append(first, view[first - start :])
         self._at = stop
         self.end = max(self.end, stop)
         return len(view)
+
+    def _append(self, at: int, rest: memoryview) -> None:
+        """Write ``rest`` to the file at a place behind the edge."""
+        if self.failure is not None:
+            return
+        try:
+            self._file.seek(at)
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self.failure = error
+
+    def replace(self, content: memoryview) -> None:
+        """Make ``content`` all that the file holds; it is not copied, and may not change."""
+        self.pages.clear()
+        below = content[: self.edge]
+        for number in self._numbers(0, len(below)):
+            page = below[number * PAGE : (number + 1) * PAGE]
+            size = min(PAGE, self.edge - number * PAGE)
+            # a file that becomes shorter ends within its last page
+            whole = page if len(page) == size else bytearray(bytes(page).ljust(size, b"\0"))
+            self.pages[number] = whole
+        self._append(self.edge, content[self.edge :])
+        self.truncate(len(content))
 
     def truncate(self, size: int | None = None, /) -> int:
         self.end = self._at if size is None else size
@@ -173,7 +196,7 @@ def changed_in_place(path: Path, lock: FileLock, fsync: bool = False) -> Iterato
             file.truncate(edge)
             journal.unlink(missing_ok=True)
             raise
-        _apply(file, patched.end, {n: bytes(p) for n, p in patched.pages.items()})
+        _apply(file, patched.end, patched.pages)
         if fsync:
             os.fsync(file.fileno())
     journal.unlink()
@@ -193,12 +216,15 @@ def replaced(path: Path) -> ReplacedError:
 
 
 def _write_journal(journal: Path, patched: Patched, fsync: bool) -> None:
-    parts = [HEAD.pack(MAGIC, patched.edge, patched.end, len(patched.pages))]
-    for number, page in sorted(patched.pages.items()):
-        parts += [PIECE.pack(number * PAGE, len(page)), patched.original(number), bytes(page)]
-    content = b"".join(parts)
+    head = HEAD.pack(MAGIC, patched.edge, patched.end, len(patched.pages))
     with replaced_when_done(journal, overwrite=True) as partial, partial.open("wb") as stream:
-        stream.write(content + struct.pack("<I", zlib.crc32(content)))
+        crc = zlib.crc32(head)
+        stream.write(head)
+        for number, page in sorted(patched.pages.items()):
+            piece = PIECE.pack(number * PAGE, len(page)) + patched.original(number) + bytes(page)
+            crc = zlib.crc32(piece, crc)
+            stream.write(piece)
+        stream.write(struct.pack("<I", crc))
         stream.flush()
         if fsync:
             os.fsync(stream.fileno())
@@ -211,7 +237,7 @@ def _write_journal(journal: Path, patched: Patched, fsync: bool) -> None:
             os.close(folder)
 
 
-def _apply(file: io.FileIO, end: int, pages: dict[int, bytes]) -> None:
+def _apply(file: io.FileIO, end: int, pages: Mapping[int, Buffer]) -> None:
     for number, page in sorted(pages.items()):
         file.seek(number * PAGE)
         rest = memoryview(page)

@@ -11,7 +11,7 @@ import numpy as np
 from dearig.recording.content.layout import describe_field
 from dearig.recording.content.text import fixed
 
-__all__ = ["ModelledWriter", "keep_modelled"]
+__all__ = ["NAME", "ModelledWriter", "keep_modelled"]
 
 #: Under /entry while the run goes on: under /entry/data readers look for finished values only.
 NAME = "modelled"
@@ -46,6 +46,7 @@ def keep_modelled(entry: h5py.Group, samples: int) -> None:
     """
     if NAME not in entry:
         return
-    entry[NAME].resize((samples,))
+    if entry[NAME].shape != (samples,):
+        entry[NAME].resize((samples,))
     entry.move(NAME, f"data/{FIELD}")
     entry["data"].attrs["auxiliary_signals"] = fixed([FIELD])

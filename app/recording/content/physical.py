@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import h5py
@@ -14,6 +14,7 @@ from dearig.recording.content.flushes import flush_notes
 from dearig.recording.content.layout import UNITS, counts_name, declared_names
 from dearig.recording.content.pyramid import levels, reduced
 from dearig.recording.content.rest_noise import NEGLIGIBLE
+from dearig.recording.content.safe import PACKED_MAX
 from dearig.recording.content.text import fixed, text_of
 
 __all__ = [
@@ -114,7 +115,9 @@ def _backed(counts: h5py.Dataset) -> int:
     HDF5 goes on writing when the disk refuses a chunk, so a dataset can claim more than is stored.
     """
     claimed = int(counts.shape[0])
-    claimed = min(claimed, int(counts.id.get_storage_size() // counts.dtype.itemsize))
+    filtered = counts.id.get_create_plist().get_nfilters() > 0
+    most = counts.id.get_storage_size() * (PACKED_MAX if filtered else 1)
+    claimed = min(claimed, int(most // counts.dtype.itemsize))
     if counts.chunks is None or _closed(counts.parent):
         return claimed
     chunk = int(counts.chunks[0])
@@ -249,6 +252,21 @@ class Counts:
             return (np.arange(start, stop) + self._first) / self.rate
         values = self._reading(name, start, stop)
         return values - self.rest.reading if name == "displacement" else values
+
+    def conversion(self, name: str) -> Callable[[np.ndarray], np.ndarray]:
+        """Return the function that makes values (n,) of ``name`` from its counts (n,).
+
+        The values of 16 bits come from a table: it costs a tenth, and gives the same bits.
+        """
+        rest = self.rest.reading if name == "displacement" else 0.0
+
+        def values(counts: np.ndarray) -> np.ndarray:
+            return self._scaled(name, counts) - rest
+
+        if self.data[counts_name(name)].dtype.itemsize > 2:
+            return values
+        table = values(np.arange(2**16).astype(np.uint16).view(np.int16))
+        return lambda counts: table[counts.astype(np.uint16)]
 
     def _reading(self, name: str, start: int, stop: int) -> np.ndarray:
         return self._scaled(name, self.data[counts_name(name)][start:stop])

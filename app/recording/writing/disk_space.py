@@ -24,6 +24,10 @@ FIXED = 200_000
 #: Times the bytes of a count: the count itself, minima and maxima over bins, checksums, indexes.
 PER_COUNT = 1.0 + 2.0 / 64.0 + 2.0 / 4096.0 + 0.001
 
+#: Bytes of a deflated physical value of a noise over the whole range of the converter, and of the
+#: time of a sample at a rate that is no decimal number, with 10 % more.
+VALUE, TIME = 7.3, 7.0
+
 #: Error number of the operating system: what happened, and what to do.
 _ADVICE = MappingProxyType(
     {
@@ -50,13 +54,16 @@ def estimate_bytes(channels: int, rate: float, samples: int, average: int = 1) -
     """Return the bytes that a run of ``samples`` samples of ``channels`` channels needs.
 
     They come at ``rate`` Hz, each the mean of ``average`` conversions. At no time from the first
-    block to the finished file it is larger.
+    block to the finished file it is larger, whatever the readings are.
     """
     size = FIXED + PER_COUNT * counts_type(average).itemsize * channels * samples
     # computer's clock and events
     size += 100.0 * samples / rate
     if samples <= PHYSICAL_MAX:
-        size += 8.0 * (channels + 1) * samples
+        # readings that are all noise: physical values, and a journal of the bytes of the counts
+        # that are replaced, old and new
+        size += (VALUE + 2.0 * counts_type(average).itemsize) * channels * samples
+        size += TIME * samples + FIXED
     else:
         size += 16.0 * (channels + 1) * OVERVIEW
     return int(size)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import io
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -22,12 +23,14 @@ from dearig.recording.content.layout import (
     attach_time,
     counts_name,
     create_field,
+    describe_field,
     iso_time,
     name_dimensions,
     show_plot,
 )
+from dearig.recording.content.modelled import NAME as MODELLED
 from dearig.recording.content.modelled import keep_modelled
-from dearig.recording.content.physical import SLICE, Counts
+from dearig.recording.content.physical import Counts
 from dearig.recording.content.pyramid import complete_pyramid
 from dearig.recording.content.text import clip_text, fixed, put_text
 from dearig.recording.files import in_words
@@ -35,11 +38,12 @@ from dearig.recording.lock import FileLock, ReplacedError
 from dearig.recording.reading.arrays import Overview
 from dearig.recording.reading.environment import mean_conditions, read_environment
 from dearig.recording.reading.opening import identifier_of, opened
+from dearig.recording.writing.packing import Packer, packer
 
 __all__ = ["OVERVIEW", "PHYSICAL_MAX", "finish"]
 
-#: Longer runs hold counts and an overview in physical units: their physical values would take four
-#: times the space, and no viewer can plot as many.
+#: Longer runs hold counts and an overview in physical units: no viewer can plot as many values, and
+#: the content of a file with physical values is made in memory.
 PHYSICAL_MAX = 2**24
 #: Bins of that overview; each is two points.
 OVERVIEW = 2**13
@@ -66,6 +70,15 @@ def finish(
     ``ReplacedError`` if another file has that name by now, and ``InputError`` if it cannot be
     written; then it is as it was.
     """
+
+    def closing(entry: h5py.Group) -> None:
+        if ended is not None:
+            put_text(entry, "end_time", iso_time(ended))
+        entry.attrs["outcome"] = fixed(clip_text(outcome, MESSAGE_BYTES).decode())
+        if output_state is not None:
+            _note_output(entry, output_state)
+        entry.attrs["complete"] = complete
+
     try:
         if not lock.is_at(path):
             raise replaced(path)
@@ -74,27 +87,19 @@ def finish(
         with changed_in_place(path, lock, fsync) as changes:
             if repair is not None:
                 repair(changes)
+            content = None
             with h5py.File(changes, "r+", libver=LIBVER) as file:
-                entry = file["entry"]
-                samples = _write_physical(entry)
-                keep_modelled(entry, samples)
-                _note_environment(entry)
-                for plot in (entry["data"], entry.get("overview")):
-                    # a very long run has its physical values, and so its time, in counts only
-                    if plot is not None and "time" in plot:
-                        attach_time(plot)
-                show_plot(entry["data"], "actuator", live=False)
-                name_dimensions(entry)
-                if ended is not None:
-                    put_text(entry, "end_time", iso_time(ended))
-                entry.attrs["samples"] = samples
-                entry.attrs["outcome"] = fixed(clip_text(outcome, MESSAGE_BYTES).decode())
-                if output_state is not None:
-                    _note_output(entry, output_state)
-                entry.attrs["complete"] = complete
+                counts = Counts(file["entry"])
+                if counts.samples > PHYSICAL_MAX:
+                    _trim_counts(counts)
+                    _complete(file["entry"], counts, closing)
+                else:
+                    content = _packed(file, counts, closing)
+            if content is not None:
+                changes.replace(content.getbuffer())
     except (OSError, RuntimeError) as error:
         raise InputError(f"{path} cannot be written: {in_words(error)}") from error
-    return samples
+    return counts.samples
 
 
 def _note_output(entry: h5py.Group, state: OutputState) -> None:
@@ -132,34 +137,94 @@ def _check_identifier(path: Path, identifier: str) -> None:
             )
 
 
-def _write_physical(entry: h5py.Group) -> int:
-    counts = Counts(entry)
-    data, samples = counts.data, counts.samples
-    for channel in counts.channels:
-        data[counts_name(channel.name)].resize((samples,))
+def _complete(entry: h5py.Group, counts: Counts, closing: Callable[[h5py.Group], None]) -> None:
+    """Write to ``entry`` all that a finished run with these ``counts`` has besides its rows."""
+    samples, data, rest = counts.samples, entry["data"], counts.rest
     complete_pyramid(entry, samples, counts.raw)
     complete_checksums(entry, samples, counts.raw)
     _trim(entry, samples)
-    rest = counts.rest
     raw = data[counts_name("displacement")]
     raw.attrs["rest_reading"], raw.attrs["rest_samples"] = rest.reading, rest.samples
-    if samples > PHYSICAL_MAX:
+    if "time" not in data:
         _write_overview(entry, counts)
-        return samples
-    timing = {
-        c.name: {"skew_s": c.skew, "delay_s": c.delay, "delay_error_s": c.delay_error}
-        for c in counts.channels
-    }
-    for name in counts.names:
-        field = _write_field(data, name, samples, timing.get(name, {}), *counts.described(name))
-        for start in range(0, samples, SLICE):
-            stop = min(start + SLICE, samples)
-            field[start:stop] = counts.window(name, start, stop)
+    keep_modelled(entry, samples)
+    _note_environment(entry)
+    for plot in (data, entry.get("overview")):
+        # a very long run has its physical values, and so its time, in counts only
+        if plot is not None and "time" in plot:
+            attach_time(plot)
+    show_plot(data, "actuator", live=False)
+    name_dimensions(entry)
+    entry.attrs["samples"] = samples
+    closing(entry)
+
+
+def _trim_counts(counts: Counts) -> None:
+    for channel in counts.channels:
+        counts.data[counts_name(channel.name)].resize((counts.samples,))
+
+
+def _packed(file: h5py.File, counts: Counts, closing: Callable[[h5py.Group], None]) -> io.BytesIO:
+    """Return the content of a finished ``file``: rows are deflated, all else is copied.
+
+    A new one, since HDF5 does not fill the gaps that chunks of other sizes leave.
+    """
+    content = io.BytesIO()
+    with h5py.File(content, "w", libver=LIBVER) as new, packer() as pack:
+        _copy_attributes(file, new)
+        entry, live = new.create_group("entry"), file["entry"]
+        _copy_attributes(live, entry)
+        rows = {counts_name(channel.name) for channel in counts.channels}
+        for name in live.keys() - {"data", MODELLED}:
+            file.copy(live[name], entry)
+        data = entry.create_group("data")
+        _copy_attributes(counts.data, data)
+        for name in counts.data.keys() - rows:
+            file.copy(counts.data[name], data)
+        for name in sorted(rows):
+            _pack_row(pack, counts.data[name], counts.samples, data)
+        if MODELLED in live:
+            _pack_row(pack, live[MODELLED], counts.samples, entry)
+        _write_physical(pack, data, counts)
+        _complete(entry, counts, closing)
+    return content
+
+
+def _copy_attributes(source: h5py.HLObject, target: h5py.HLObject) -> None:
+    for name, value in source.attrs.items():
+        target.attrs.create(name, value, dtype=source.attrs.get_id(name).dtype)
+
+
+def _pack_row(pack: Packer, row: h5py.Dataset, samples: int, group: h5py.Group) -> None:
+    """Write the first ``samples`` values of ``row`` to ``group``, with its attributes."""
+
+    def part(start: int, stop: int) -> np.ndarray:
+        # after a kill the overlay can be behind the counts
+        values = np.full(stop - start, row.fillvalue, dtype=row.dtype)
+        there = row[start:stop]
+        values[: there.size] = there
+        return values
+
+    stored = pack.pack(samples, part).store(group, row.name.rpartition("/")[2])
+    _copy_attributes(row, stored)
+
+
+def _write_physical(pack: Packer, data: h5py.Group, counts: Counts) -> None:
+    """Write the physical values of ``counts`` to ``data``, with time."""
+    for channel in counts.channels:
+        name = channel.name
+        raw, convert = counts.data[counts_name(name)], counts.conversion(name)
+        field = pack.pack(counts.samples, lambda a, b: convert(raw[a:b])).store(data, name)  # noqa: B023
+        describe_field(field, name, *counts.described(name))
+        field.attrs["skew_s"] = channel.skew
+        field.attrs["delay_s"] = channel.delay
+        field.attrs["delay_error_s"] = channel.delay_error
+    time = pack.pack(counts.samples, lambda a, b: counts.window("time", a, b)).store(data, "time")
+    describe_field(time, "time")
     held = ZERO_ORDER if counts.average == 1 else LINEAR
     data["voltage_command"].attrs["hold"] = fixed(held)
-    data["displacement"].attrs["rest_reading"] = rest.reading
-    data["displacement"].attrs["rest_samples"] = rest.samples
-    return samples
+    data["displacement"].attrs["rest_reading"] = counts.rest.reading
+    data["displacement"].attrs["rest_samples"] = counts.rest.samples
 
 
 def _trim(entry: h5py.Group, samples: int) -> None:
@@ -186,20 +251,6 @@ def _write_overview(entry: h5py.Group, counts: Counts) -> None:
             continue
         time, low, high = counts.overview(name, 0, counts.samples, OVERVIEW)
         if "time" not in group:
-            _write_field(group, "time", 2 * time.size, {})[:] = np.repeat(time, 2)
-        field = _write_field(group, name, 2 * low.size, {}, *counts.described(name))
+            create_field(group, "time", 2 * time.size)[:] = np.repeat(time, 2)
+        field = create_field(group, name, 2 * low.size, *counts.described(name))
         field[:] = np.stack((low, high), axis=1).reshape(-1)
-
-
-def _write_field(
-    data: h5py.Group,
-    name: str,
-    samples: int,
-    attributes: Mapping[str, float],
-    unit: str = "",
-    label: str = "",
-) -> h5py.Dataset:
-    dataset = create_field(data, name, samples, unit, label)
-    for key, value in attributes.items():
-        dataset.attrs[key] = value
-    return dataset

@@ -9,7 +9,7 @@ from typing import Any
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QWidget
 
-from dearig.acquisition.warm_up import compile_kernels, has_cache, is_warm, kernels_compiled
+from dearig.acquisition.warm_up import compile_kernels, has_cache, is_warm
 from dearig.window.jobs.background import Background
 from dearig.window.jobs.worker import Job, Worker
 from dearig.window.kit.theme import SPACE
@@ -17,7 +17,8 @@ from dearig.window.kit.widgets import ElidedLabel
 
 __all__ = ["Compilation", "CompilationBar"]
 
-_LOOK = 500  # ms between two looks at the kernels that are compiled
+_FINE = 1000  # steps of the bar
+_TICK = 500  # ms between two showings of the time
 
 
 class Compilation(QObject):
@@ -48,15 +49,16 @@ class Compilation(QObject):
         self._has_cache = has_cache
         self._clock = clock
         self._began = 0.0
-        self._before = 0  # kernels that were in the cache
+        self.stage = ""  #: as "kernel 12 of 300"; "" before the first, and where no process tells
+        self.part = 0.0  #: part of the kernels that is ready, 0 to 1
         self._running = False
         self._job: Job | None = None
         self._worker = Worker(self)
         self._thread = Background(self)
         self._thread.done.connect(self._finished)
         self._thread.failed.connect(self._failed)
-        self._look = QTimer(self, interval=_LOOK)
-        self._look.timeout.connect(self.progressed)
+        self._tick = QTimer(self, interval=_TICK)
+        self._tick.timeout.connect(self.progressed)
 
     @property
     def running(self) -> bool:
@@ -68,33 +70,33 @@ class Compilation(QObject):
         """Time in s since the compilation began."""
         return self._clock() - self._began
 
-    @property
-    def kernels(self) -> int:
-        """Number of kernels that were compiled since then."""
-        return kernels_compiled() - self._before
-
     def start(self) -> bool:
         """Begin, and return True; return False where nothing is to be compiled."""
         if self._running or not self._needed():
             return False
         self._running, self._began = True, self._clock()
-        self._before = kernels_compiled()
         if self._has_cache():
             self._job = job = self._worker.submit(self._work)
+            job.progressed.connect(self._progressed)
             job.finished.connect(self._finished)
             job.failed.connect(self._failed)
         else:
             self._thread.start(self._work)
-        self._look.start()
+        self._tick.start()
         self.running_changed.emit(True)
         return True
 
     def close(self) -> None:
         """End the process."""
-        self._look.stop()
+        self._tick.stop()
         self._running, self._job = False, None
         self._worker.close()
         self._thread.close()
+
+    @Slot(str, float, float)
+    def _progressed(self, stage: str, part: float, _: float) -> None:
+        self.stage, self.part = stage, part
+        self.progressed.emit()
 
     @Slot(object)
     def _finished(self, result: object = None) -> None:  # noqa: ARG002
@@ -108,17 +110,13 @@ class Compilation(QObject):
 
 
 class CompilationBar(QFrame):
-    """Says that the model is compiled and for how long; hidden at other times.
-
-    How many kernels there will be is not known beforehand, so the bar shows no part of them.
-    """
+    """Says that the model is compiled, how far, and for how long; hidden at other times."""
 
     def __init__(self, compilation: Compilation, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._compilation = compilation
         self.words = ElidedLabel(hugging=True)
         self.bar = QProgressBar()
-        self.bar.setRange(0, 0)  # it moves without an end
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(10)
         self.bar.setFixedWidth(180)
@@ -134,10 +132,15 @@ class CompilationBar(QFrame):
 
     @Slot()
     def _refresh(self) -> None:
-        running = self._compilation.running
-        self.setVisible(running)
-        if running:
-            self.words.show_text(
-                f"Compiling the model once, about a minute: {self._compilation.seconds:.0f} s, "
-                f"{self._compilation.kernels} functions; the plan follows"
-            )
+        of = self._compilation
+        self.setVisible(of.running)
+        if not of.running:
+            return
+        # without a number it moves without an end
+        self.bar.setRange(0, _FINE if of.stage else 0)
+        self.bar.setValue(round(of.part * _FINE))
+        minutes, seconds = divmod(int(of.seconds), 60)
+        stage = f"{of.stage}, " if of.stage else ""
+        self.words.show_text(
+            f"Compiling the model once: {stage}{minutes}:{seconds:02d}; the plan follows"
+        )

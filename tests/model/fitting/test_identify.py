@@ -481,13 +481,14 @@ def test_records_of_any_length_are_shared_out_evenly():
     )
     problem = Problem([short, long], FitLayout(plain), 2, kernel.QUICK)
     lengths = [r.drive.time.size for r in problem.records]
-    for members in (1, 2, 3, 8):
-        shares = problem._shared_out(np.zeros(members, dtype=bool))
+    for members, packed in ((1, False), (2, False), (3, False), (8, False), (10, True)):
+        shares = problem._shared_out(np.zeros(members, dtype=bool), packed)
         jobs = [job for share in shares for job in share]
-        assert sorted(jobs) == [(m, i) for m in range(members) for i in range(2)]
+        films = sorted((m, i) for some, i in jobs for m in some)
+        assert films == [(m, i) for m in range(members) for i in range(2)]
+        assert max(len(some) for some, _ in jobs) == (4 if packed else 1)
         loads = [sum(lengths[i] for _, i in share) for share in shares]
         assert max(loads) - min(loads) <= max(lengths)
-    assert loads[0] == loads[1]
     # and whoever simulates them, they say the same
     several = np.tile(problem.layout.initial(), (3, 1)) * np.array([[1.0], [1.1], [0.9]])
     one_by_one = Problem([short, long], FitLayout(plain), 1, kernel.QUICK).predict(several)[0]
@@ -530,9 +531,11 @@ def test_work_is_counted_in_steps_and_in_populations():
         return told[-1]
 
     samples = record.drive.time.size
-    one, three = work(plain), work(plain, members=3)
-    assert (one[0], three[0]) == (1, 3)
-    steps = 0.5 * (three[1] - one[1])
+    one, four, five = (work(plain, members=m) for m in (1, 4, 5))
+    assert (one[0], four[0], five[0]) == (1, 4, 5)
+    # films go four at a time
+    assert four[1] == one[1]
+    steps = five[1] - four[1]
     assert steps >= samples - 1
     # a population takes something beside its steps
     assert one[1] - steps == pytest.approx(1.5e4)

@@ -114,7 +114,7 @@ def test_stiff_films_are_simulated_one_by_one():
     layout = FitLayout(model)
     problem = Problem(made(model), layout)
     x = layout.coordinates(layout.initial())
-    assert problem.predict_neighbours(layout.values(np.tile(x, (2, 1)))) is None
+    assert problem.differences(layout.values(np.tile(x, (2, 1)))) is None
     free = np.array([n == "mu_0" for n in layout.names])
     known = one_by_one(problem, x)[:, free]
     np.testing.assert_allclose(problem.jacobian(x, free), known)
@@ -133,7 +133,7 @@ def test_neighbours_count_as_simulations_and_cost_what_their_packs_do():
     problem = Problem(made(PLAIN), layout, on_simulations=count)
     values = np.tile(layout.initial(), (12, 1))
     problem.predict(values[:1])
-    assert problem.predict_neighbours(values) is not None
+    assert problem.differences(values) is not None
     (one, alone), (twelve, beside) = seen
     assert (one, twelve, problem.simulations) == (1, 12, 13)
     # one film alone, then three packs

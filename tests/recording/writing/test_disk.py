@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 from collections import namedtuple
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dearig.drivers.channels import Scaling
 from dearig.drivers.rig import Block
 from dearig.errors import DiskFault, InputError
 from dearig.recording import open_recording, recover
-from dearig.recording.content.journal import Patched, changed_in_place, journal_of
+from dearig.recording.content.journal import (
+    Patched,
+    _apply,
+    carry_out,
+    changed_in_place,
+    journal_of,
+    whole_journal,
+)
 from dearig.recording.lock import FileLock, lock_existing
 from dearig.recording.verify import verify
 from dearig.recording.writing.disk_space import (
@@ -25,7 +35,15 @@ from dearig.recording.writing.disk_space import (
     estimate_bytes,
     free_bytes,
 )
-from tests.tools.recordings import CHANNELS, RATE, Clock, run_counts, write_run, writer
+from tests.tools.recordings import (
+    CHANNELS,
+    IDENTITY,
+    RATE,
+    Clock,
+    run_counts,
+    write_run,
+    writer,
+)
 
 Usage = namedtuple("Usage", "total used free")
 
@@ -35,17 +53,42 @@ def room(monkeypatch: pytest.MonkeyPatch, free: float) -> None:
 
 
 @pytest.mark.parametrize("samples", [20_000, 300_000, 1_000_000])
-@pytest.mark.parametrize("long", [False, True])
-def test_the_estimate_is_near_the_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int, long: bool
+def test_the_estimate_is_near_the_file_of_a_very_long_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int
 ) -> None:
-    if long:
-        for module in ("finish", "disk_space"):
-            monkeypatch.setattr(f"dearig.recording.writing.{module}.PHYSICAL_MAX", 1000)
+    for module in ("finish", "disk_space"):
+        monkeypatch.setattr(f"dearig.recording.writing.{module}.PHYSICAL_MAX", 1000)
     path = tmp_path / "run.h5"
     write_run(path, run_counts(samples), block=10_000)
     size = path.stat().st_size
     assert size <= estimate_bytes(len(CHANNELS), RATE, samples) <= 1.2 * size + 600_000
+
+
+#: A card's own scaling, whose values have no zeros at their ends.
+BENT = Scaling((-4.62141825e-04, 3.05202888e-04, -2.47733456e-13, 5.43883236e-18), 4e-3)
+
+
+@pytest.mark.parametrize("samples", [3000, 300_000])
+@pytest.mark.parametrize("rate", [RATE, 12345.678])
+def test_the_end_of_a_run_of_noise_needs_no_more_than_the_estimate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int, rate: float
+) -> None:
+    path = tmp_path / "run.h5"
+    channels = tuple(replace(channel, scaling=BENT) for channel in CHANNELS)
+    identity = replace(IDENTITY, channels=channels)
+    noise = np.random.default_rng(0).integers(-(2**15), 2**15, (4, samples)).astype(np.int16)
+    used: list[int] = []
+
+    def apply(file: io.FileIO, end: int, pages: dict[int, bytes]) -> None:
+        used.append(sum(each.stat().st_size for each in tmp_path.iterdir()))
+        _apply(file, end, pages)
+
+    monkeypatch.setattr("dearig.recording.content.journal._apply", apply)
+    with writer(path, identity=identity, rate_Hz=rate, samples_expected=samples) as recorder:
+        recorder.append(Block(0, noise))
+    estimate = estimate_bytes(len(CHANNELS), rate, samples)
+    assert max(used) <= estimate <= 1.2 * max(used) + 600_000
+    assert path.stat().st_size <= estimate
 
 
 def test_a_run_that_does_not_fit_is_refused(
@@ -169,7 +212,7 @@ class Full:
         return self.file.write(data)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("takes", [0, 100, 30_000, 90_000])
+@pytest.mark.parametrize("takes", [0, 100, 5_000, 20_000])
 def test_a_full_disk_at_the_end_changes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, takes: int
 ) -> None:
@@ -197,6 +240,38 @@ def test_a_full_disk_at_the_end_changes_nothing(
     monkeypatch.undo()
     assert recover(path)
     assert verify(path).sound
+
+
+@pytest.mark.parametrize("size", [0, 1, 4096, 10_000, 12_288, 12_289, 20_000])
+@pytest.mark.parametrize("done", [0, 1, 2, 99])
+def test_a_content_that_is_half_replaced_is_seen_and_made_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int, done: int
+) -> None:
+    path, new = tmp_path / "x", np.random.default_rng(1).bytes(size)
+    path.write_bytes(np.random.default_rng(2).bytes(12_289))
+
+    def killed(file: io.FileIO, end: int, pages: dict[int, bytes]) -> None:
+        first = dict(sorted(pages.items())[:done])
+        _apply(file, end if done == 99 else max(end, 12_289), first)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dearig.recording.content.journal._apply", killed)
+    with (
+        pytest.raises(KeyboardInterrupt),
+        lock_existing(path) as lock,
+        changed_in_place(path, lock) as patched,
+    ):
+        patched.replace(memoryview(new))
+    monkeypatch.undo()
+    found = whole_journal(path)
+    assert found is not None
+    with path.open("rb", buffering=0) as file:
+        shown = Patched(file, found[0], {n: bytearray(page) for n, page in found[2].items()})
+        shown.end = found[1]
+        assert shown.read() == new
+    with lock_existing(path) as lock:
+        assert carry_out(path, lock)
+    assert path.read_bytes() == new
 
 
 def test_a_change_that_fails_leaves_the_file(tmp_path: Path) -> None:

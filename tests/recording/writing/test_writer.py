@@ -378,3 +378,21 @@ def test_other_films_and_loads_come_back(tmp_path: Path) -> None:
 
 def test_flushes_are_due_four_times_a_second() -> None:
     assert writer_module.FLUSH_INTERVAL == 0.25
+
+
+def test_a_finished_run_takes_at_most_twice_the_bytes_of_its_counts(tmp_path: Path) -> None:
+    counts = run_counts(200_000)
+    write(tmp_path / "run.h5", counts, block=10_000)
+    assert (tmp_path / "run.h5").stat().st_size <= 2 * counts.nbytes
+
+
+def test_values_are_those_of_the_scaling_to_the_last_bit(tmp_path: Path) -> None:
+    counts = write(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5", "r") as file:
+        data = file["entry/data"]
+        for channel, row in zip(CHANNELS, counts, strict=True):
+            rest = data[channel.name].attrs.get("rest_reading", 0.0)
+            expected = channel.scaling.physical(row) - rest
+            assert data[channel.name][()].tobytes() == expected.tobytes()
+            assert (data[f"{channel.name}_counts"][()] == row).all()
+        assert data["time"][()].tobytes() == (np.arange(3000) / RATE).tobytes()
