@@ -13,7 +13,7 @@ from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.budget import diagnosis_with_budget, given_values
 from dearig.analysis.cores import for_simulations
-from dearig.analysis.experiment import experiment_of, prediction_errors, with_excitation
+from dearig.analysis.experiment import experiment_of, with_excitation
 from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
@@ -23,6 +23,7 @@ from dearig.analysis.outcomes import (
     estimate_table,
     pooled_rms,
 )
+from dearig.analysis.readings.band import judged_with_bands, prediction_table
 from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import (
     assumed_by,
@@ -34,7 +35,7 @@ from dearig.analysis.readings.enough import check_enough, extrapolated, few_data
 from dearig.analysis.readings.opening import Source, check_named_once
 from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
 from dearig.analysis.readings.room import air_texts_of, room_texts
-from dearig.config.modelfile import HELD_VOLTAGE, ModelFile
+from dearig.config.modelfile import COVARIANCE, HELD_VOLTAGE, PREDICTION, ModelFile
 from dearig.config.parameterfile import Stated, constraints_of
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence, parse_sequence
@@ -52,6 +53,7 @@ from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
 from dearig.model.fitting import Constraint, GivenValue
+from dearig.model.fitting.parameters import NORMAL_95
 from dearig.model.fitting.prediction import prediction_gain
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
@@ -417,6 +419,7 @@ def _outcome(
         for stand, stage in zip(stands, models, strict=True)
     )
     noise = _noise(fitted)
+    stands = (*stands[:-1], judged_with_bands(stands[-1], others, finding.final, {}))
     seconds = clock() - started
     said = (*quality, *dict.fromkeys(failed))
     recordings = recordings_of(fitted)
@@ -444,8 +447,8 @@ def _outcome(
         few_data=few_data(fitted),
         assumed=assumed_by(recordings, settings.rig_file),
         not_compared=tuple(r.name for r in others if r.name not in compared),
-        prediction_errors=prediction_errors(
-            [r for r in others if r.name in compared], finding.final
+        prediction_errors=tuple(
+            NORMAL_95 * c.band.parameters_rms for c in stands[-1].validation if c.band is not None
         ),
         # what happened in the training recordings alone is for no other recording to confirm
         gain=_gain(stands, own, noise) if any(s.may_recur for s in finding.steps) else None,
@@ -458,7 +461,12 @@ def _outcome(
         plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)
         outcome = replace(outcome, model=plain)
     history = _history(outcome, recordings)
-    return replace(outcome, model=replace(outcome.model, history=history))
+    place = -1 if outcome.recommends_final else 0
+    stage = finding.final if outcome.recommends_final else finding.baseline
+    judged = list(outcome.stands)
+    judged[place] = judged_with_bands(judged[place], others, stage, history)
+    model = replace(outcome.model, history=history)
+    return replace(outcome, model=model, stands=tuple(judged))
 
 
 def _title(recordings: Sequence[Recording]) -> str:
@@ -546,6 +554,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
     """Return the origin of the model, for its file."""
     finding, stands = outcome.finding, outcome.stands
     stage = finding.final if outcome.recommends_final else finding.baseline
+    judged = stands[-1] if outcome.recommends_final else stands[0]
     shown = SHOWN[outcome.kind]
 
     def rms(comparisons: Sequence[Comparison]) -> float | None:
@@ -585,6 +594,7 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
             for s in (finding.steps if outcome.recommends_final else ())
         ],
         "estimate": estimate_table(stage.estimates),
-        "covariance": covariance_table(stage.covariance_names, stage.covariance),
+        COVARIANCE: covariance_table(stage.covariance_names, stage.covariance),
+        PREDICTION: prediction_table(judged.train, judged.validation, outcome.noise),
         "uncertainty_budget": budget_table(stage.budget),
     }

@@ -15,15 +15,13 @@ import tomli_w
 
 from dearig.acquisition.plan import Plan, plan
 from dearig.acquisition.prediction import peaks_of
-from dearig.analysis.cores import for_simulations
 from dearig.analysis.outcomes import (
-    Comparison,
     DeterminingRecord,
     DiagnoseOutcome,
     SeparatingExperiment,
 )
+from dearig.analysis.readings.band import motion_of
 from dearig.analysis.readings.compatibility import of_rig
-from dearig.analysis.readings.record import Readings
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
@@ -32,8 +30,7 @@ from dearig.drivers.interlocks import would_trip
 from dearig.drivers.samples import Repeated
 from dearig.errors import InputError
 from dearig.model.diagnosis.excitation import Excitation, Motion, excitation, range_of
-from dearig.model.diagnosis.results import Diagnosis, Stage
-from dearig.model.fitting.prediction import prediction_error
+from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.kernel import OK
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import THESIS_AMPLITUDES
@@ -44,7 +41,6 @@ __all__ = [
     "candidates",
     "determining_record",
     "experiment_of",
-    "prediction_errors",
     "separating_experiment",
     "with_excitation",
 ]
@@ -351,20 +347,6 @@ def _model_label(model: Actuator) -> str:
     return " with ".join(name for name, _ in model.effects) or "the baseline"
 
 
-@for_simulations()
-def prediction_errors(readings: Sequence[Readings], final: Stage) -> tuple[float, ...]:
-    """Return what the parameters' own error may make of each of ``readings``, in m or Pa.
-
-    () where the parameters have no covariance.
-    """
-    if not final.covariance_names:
-        return ()
-    return tuple(
-        prediction_error(each.record, final.predicting, final.covariance_names, final.covariance)
-        for each in readings
-    )
-
-
 def with_excitation(outcome: DiagnoseOutcome, rig_file: RigFile) -> DiagnoseOutcome:
     """Return ``outcome`` with what its validation recordings ask of the model that is judged.
 
@@ -374,8 +356,8 @@ def with_excitation(outcome: DiagnoseOutcome, rig_file: RigFile) -> DiagnoseOutc
     after, model = outcome.after, outcome.finding.final.predicting
     if outcome.kind == "film" or not after.validation or not isinstance(model, Actuator):
         return outcome
-    fitted = [_motion(c, outcome.noise) for c in after.train]
-    asked = [_motion(c, outcome.noise) for c in after.validation]
+    fitted = [motion_of(c, outcome.noise) for c in after.train]
+    asked = [motion_of(c, outcome.noise) for c in after.validation]
     found = replace(
         outcome,
         excitation=tuple(
@@ -388,14 +370,3 @@ def with_excitation(outcome: DiagnoseOutcome, rig_file: RigFile) -> DiagnoseOutc
         return found
     record = determining_record(model, found.undetermined, rig_file, outcome.noise)
     return replace(found, determining=record)
-
-
-def _motion(comparison: Comparison, noise: float) -> Motion:
-    step: Any = np.median(np.diff(comparison.time))
-    return Motion(
-        comparison.name,
-        float(step),
-        np.nan_to_num(comparison.drive),
-        comparison.model,
-        max(comparison.noise or 0.0, noise),
-    )

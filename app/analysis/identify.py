@@ -21,8 +21,10 @@ from dearig.analysis.outcomes import (
     budget_table,
     covariance_table,
     estimate_table,
+    pooled_noise,
     pooled_over_noise,
 )
+from dearig.analysis.readings.band import prediction_table, with_bands
 from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.compatibility import (
     assumed_by,
@@ -35,7 +37,7 @@ from dearig.analysis.readings.opening import Source, check_named_once
 from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
 from dearig.analysis.readings.room import room_texts
 from dearig.analysis.thesis_runs import PUBLISHED_FIT
-from dearig.config.modelfile import ModelFile
+from dearig.config.modelfile import COVARIANCE, PREDICTION, ModelFile
 from dearig.config.parameterfile import Stated, constraints_of
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
@@ -153,21 +155,23 @@ def identify_recordings(
         fit = with_budget(records, fit, given, progress=progress, stop=stop)
     interrupted = interrupts.asked()
     compared = [compare(r, fit.model, "train") for r in fitted]
-    validated = [compare(r, fit.model, "validation") for r in others]
-    seconds = clock() - started
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
+    covariance = covariance_table(fit.covariance_names, fit.covariance)
+    model = ModelFile(name, fit.model, {COVARIANCE: covariance})
+    validated = with_bands([compare(r, fit.model, "validation") for r in others], others, model)
+    seconds, kind = clock() - started, recordings[0].kind
     history = _history(fit, recordings, compared, validated, spring, drive, seconds)
-    kind = recordings[0].kind
+    model = replace(model, history=history)
     is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
     return IdentifyOutcome(
         title=name,
         kind=kind,
         method=method,
-        model=ModelFile(name, fit.model, history),
+        model=model,
         fit=fit,
         train=tuple(compared),
-        validation=tuple(validated),
+        validation=with_bands(validated, others, model),
         trials=tuple(trials),
         springs=springs,
         seconds=seconds,
@@ -347,6 +351,7 @@ def _history(
         ],
         "validation": [figures(c) for c in validation],
         "estimate": estimate_table(fit.estimates),
-        "covariance": covariance_table(fit.covariance_names, fit.covariance),
+        COVARIANCE: covariance_table(fit.covariance_names, fit.covariance),
+        PREDICTION: prediction_table(train, validation, pooled_noise(train) or 0.0),
         "uncertainty_budget": budget_table(fit.budget),
     }

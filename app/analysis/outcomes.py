@@ -26,6 +26,7 @@ from dearig.model.verdict import (
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
+    from dearig.analysis.readings.band import PredictionBand
     from dearig.config.modelfile import ModelFile
     from dearig.model.diagnosis.events import OneTimeEvent
     from dearig.model.diagnosis.excitation import Excitation, Tested
@@ -84,7 +85,8 @@ class Comparison:
     ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
     ``step`` is the converter step of ``measured``, 0.0 where it is not known; each reading is the
     mean of ``average`` conversions. ``channels`` are the electrical channels, with what the plain
-    circuit and the model leave of them; ``curves`` are those that are used, over time.
+    circuit and the model leave of them; ``curves`` are those that are used, over time. ``band`` is
+    that of the prediction; None where the model has none.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Comparison:
     average: int = 1
     channels: tuple[ChannelResult, ...] = ()
     curves: tuple[ChannelCurve, ...] = ()
+    band: PredictionBand | None = None
 
     @property
     def is_simulated(self) -> bool:

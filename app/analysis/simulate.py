@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dearig.analysis.readings.band import PredictionBand, band_of
 from dearig.analysis.readings.record import Readings
 from dearig.config.modelfile import ModelFile, load_model, model_toml
 from dearig.config.rigfile import RigFile
@@ -16,6 +17,7 @@ from dearig.errors import InputError
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.stability import pull_in_voltage
 from dearig.model.simulation.strip import Strip
+from dearig.recording.content.layout import BAND_ENDINGS, SIGNALS
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.reading.origin import MODEL
@@ -34,7 +36,8 @@ class SimulatedRecord:
     ``kind`` is actuator or film, ``hold`` and ``kinematics`` as of a recording, ``sequence_toml``
     that of the drive. ``field_max`` is the largest true field phi/z in V/m. ``pull_in`` is the
     voltage in V beyond which the film has no stable stretch; None where it stiffens first. Both are
-    None for a film.
+    None for a film. ``band`` is that of the response; None where it was not asked for, or where the
+    model's file has no covariance.
     """
 
     title: str
@@ -46,6 +49,38 @@ class SimulatedRecord:
     sequence_toml: str = ""
     field_max: float | None = None
     pull_in: float | None = None
+    band: PredictionBand | None = None
+
+    @property
+    def response(self) -> np.ndarray:
+        """The displacement (N,) in m, or the nominal stress in Pa."""
+        return self.values[SIGNALS[self.kind]]
+
+    @property
+    def open_limits(self) -> tuple[str, ...]:
+        """Locking limits that the fit of the model did not determine, by their names."""
+        estimates = self.model.history.get("estimate")
+        tables = estimates if isinstance(estimates, list) else []
+        return tuple(
+            str(e["name"])
+            for e in tables
+            if isinstance(e, dict) and e.get("determined") is False
+            and str(e.get("name", "")).startswith("J_")
+        )  # fmt: skip
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """The values and, where there is one, the band: its ends and its parts, (N,) each."""
+        found = dict(self.values)
+        if self.band is not None:
+            half, name = self.band.half_width, SIGNALS[self.kind]
+            ones = np.ones_like(half)
+            parts = (
+                self.response - half, self.response + half,
+                self.band.parameters, self.band.noise * ones, self.band.law * ones,
+            )  # fmt: skip
+            found |= {f"{name}_{end}": p for end, p in zip(BAND_ENDINGS, parts, strict=True)}
+        return found
 
 
 def simulate_model(
@@ -54,12 +89,15 @@ def simulate_model(
     *,
     rig_file: RigFile | None = None,
     voltage: str = "command",
+    band: bool = False,
 ) -> SimulatedRecord:
     """Drive ``model`` with a recording or a sequence; a path is opened, and so is a preset's name.
 
     A recorded voltage is followed as the recording says (held by the converter, or linear between
     samples); a planned one as the sequence itself, sampled at the rate of ``rig_file``. ``voltage``
-    is command or monitor. Nothing is written; ``save_prediction`` does. Raises ``InputError``.
+    is command or monitor. With ``band`` the result has the 95 % band of the response, if the model
+    file has a covariance: two simulations for each parameter. Nothing is written;
+    ``save_prediction`` does. Raises ``InputError``.
     """
     given = model if isinstance(model, ModelFile) else load_model(model)
     if not isinstance(drive, Recording | LoadedSequence):
@@ -67,7 +105,8 @@ def simulate_model(
         drive = open_recording(drive) if recorded else load_sequence(drive)
     if isinstance(drive, LoadedSequence):
         rate = float((rig_file or RigFile()).card.sample_rate_Hz)
-        values, field_max, pull_in = _actuator(given.model, Drive(*drive.sample(rate)))
+        planned = Drive(*drive.sample(rate))
+        values, field_max, pull_in = _actuator(given.model, planned)
         return SimulatedRecord(
             title=f"{given.name} under {drive.sequence.name}",
             kind="actuator",
@@ -76,14 +115,20 @@ def simulate_model(
             sequence_toml=drive.toml,
             field_max=field_max,
             pull_in=pull_in,
+            band=band_of(given, planned, values["displacement"]) if band else None,
         )
     title = f"{given.name} under {drive.title or drive.name}"
     if drive.kind == "film":
+        values = _film(given.model, drive.kinematics, drive.time, drive.stretch)
+        stretched = values["time"], values["stretch"]
         return SimulatedRecord(
             title=title,
             kind="film",
             model=given,
-            values=_film(given.model, drive.kinematics, drive.time, drive.stretch),
+            values=values,
+            band=band_of(given, stretched, values["nominal_stress"], kinematics=drive.kinematics)
+            if band
+            else None,
             kinematics=drive.kinematics,
             sequence_toml=drive.sequence_toml,
         )
@@ -98,6 +143,7 @@ def simulate_model(
         sequence_toml=drive.sequence_toml,
         field_max=field_max,
         pull_in=pull_in,
+        band=band_of(given, driven, values["displacement"]) if band else None,
     )
 
 
@@ -111,7 +157,7 @@ def save_prediction(prediction: SimulatedRecord, out: str | Path, overwrite: boo
         raise InputError(f"{out}: the output is a recording (.h5) or a table (.csv)")
     if target.suffix == ".csv":
         with replaced_when_done(target, overwrite) as partial:
-            _write_csv(partial, prediction.values)
+            _write_csv(partial, prediction.columns)
         return target
     given = prediction.model
     film = load = None
@@ -120,7 +166,7 @@ def save_prediction(prediction: SimulatedRecord, out: str | Path, overwrite: boo
     return save_recording(
         target,
         prediction.kind,
-        prediction.values,
+        prediction.columns,
         RunMetadata(
             title=prediction.title,
             film=film,
@@ -176,6 +222,10 @@ def _write_csv(path: Path, values: Mapping[str, np.ndarray]) -> None:
         "stretch": ("stretch", 1.0),
         "nominal_stress": ("nominal_stress_kPa", 1e-3),
     }
+    for name in SIGNALS.values():
+        whole, factor = columns[name]
+        unit = whole.removeprefix(name)
+        columns |= {f"{name}_{end}": (f"{name}_{end}{unit}", factor) for end in BAND_ENDINGS}
     table = np.column_stack([values[name] * columns[name][1] for name in values])
     header = ",".join(columns[name][0] for name in values)
     np.savetxt(path, table, fmt="%.12g", delimiter=",", header=header, comments="")

@@ -46,11 +46,12 @@ def track(
 ) -> TrackOutcome:
     """Make the film on the rig at ``address`` follow ``target``, learning from run to run.
 
-    The first run plays the voltage that ``model`` asks for, and ``iterations`` more what was
-    learned. With ``compare``, a linear map and that model are played before. Recordings and the
-    sequences that were played are written to ``folder``. A target that the film misses by more than
-    ``within`` m is refused; with ``nearest`` the nearest feasible one is followed. ``ended`` is
-    called with what was done where a run ends early, before its error is raised.
+    The first run plays the voltage that ``model`` asks for, and up to ``iterations`` more what was
+    learned; they end once nothing more is learned. With ``compare``, a linear map and that model
+    are played before. Recordings and the sequences that were played are written to ``folder``. A
+    target that the film misses by more than ``within`` m is refused; with ``nearest`` the nearest
+    feasible one is followed. ``ended`` is called with what was done where a run ends early, before
+    its error is raised.
 
     Raises ``InputError`` before anything is played for a target that cannot be reached, and what
     ``record`` raises.
@@ -74,6 +75,8 @@ def track(
         while (proposal := tracking.proposed) is not None:
             result = play(proposal)
             tracking.add(open_recording(result.path), result.margins)
+            if tracking.settled:  # the film is spared runs that teach nothing
+                break
     except (DearigError, KeyboardInterrupt) as error:
         stopped: DearigError
         if isinstance(error, DearigError):
@@ -91,7 +94,7 @@ def track(
         if stopped is error:
             raise
         raise stopped from error
-    return tracking.outcome(address)
+    return tracking.outcome(address, reason=tracking.settled if tracking.proposed else "")
 
 
 def _options(options: RunOptions, proposal: Proposal, done: int) -> RunOptions:

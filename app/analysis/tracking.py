@@ -11,11 +11,13 @@ import logging
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import tomli_w
 
+from dearig.analysis.readings.band import PredictionBand, band_of, covariance_of
 from dearig.analysis.readings.record import Readings
 from dearig.analysis.track_target import WITHIN, missed_parts, task_of
 from dearig.config.modelfile import ModelFile
@@ -37,7 +39,7 @@ from dearig.model.control import (
 from dearig.model.errors import ModelError
 from dearig.model.fitting.parameters import NORMAL_95, FitLayout
 from dearig.model.readings.noise import noise_of
-from dearig.model.simulation.actuator import Actuator
+from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import Sampled, Sequence
 from dearig.model.simulation.stability import static_stretch
 from dearig.recording.reading.recording import Recording
@@ -176,7 +178,8 @@ class TrackOutcome:
     """A target that was followed: what can be reached, and every run.
 
     ``status`` is ``complete``, ``interrupted`` by the operator, or ``stopped`` by a limit, an
-    instrument or the gate, with the ``reason``. ``noise`` in m is that of a reading, ``within`` in
+    instrument or the gate, with the ``reason``; a complete one has a reason where nothing more was
+    to be learned before all runs were made. ``noise`` in m is that of a reading, ``within`` in
     m the distance from the target that is accepted.
     """
 
@@ -196,6 +199,20 @@ class TrackOutcome:
     def feasible(self) -> bool:
         """True if the film can follow the whole target, within the accepted distance."""
         return not missed_parts(self.inversion.unreachable, self.within)
+
+    @cached_property
+    def band(self) -> PredictionBand | None:
+        """The band of what the model predicts of its own first run, about the target.
+
+        None where its file has no covariance, and before that run.
+        """
+        first = next((r for r in self.runs if r.kind == "model"), None)
+        if first is None or not isinstance(self.model.model, Actuator):
+            return None
+        driven = Drive(first.time, first.voltage, hold=True)
+        response = self.model.model.simulate(driven)
+        band = band_of(self.model, driven, response.displacement) if response.ok else None
+        return None if band is None else replace(band, noise=first.noise)
 
     @property
     def best(self) -> TrackedRun | None:
@@ -464,19 +481,12 @@ def alternatives_of(model: ModelFile) -> tuple[Actuator, ...]:
     ``dearig identify`` and ``dearig diagnose`` write; a model without one has none. No parameter is
     moved farther than a fit's linearisation holds, nor out of its range.
     """
-    actuator, table = model.model, model.history.get("covariance")
-    if not isinstance(actuator, Actuator) or not isinstance(table, dict):
+    actuator, fitted = model.model, covariance_of(model)
+    if not isinstance(actuator, Actuator) or fitted is None:
         return ()
     layout = FitLayout(actuator)
-    try:
-        columns = [layout.names.index(name) for name in table["names"]]
-        covariance = np.array(table["matrix"], dtype=np.float64)
-    except (KeyError, TypeError, ValueError) as error:
-        log.info("the covariance of the model %r is of no use: %s", model.name, error)
-        return ()
-    if covariance.shape != (len(columns), len(columns)) or not np.isfinite(covariance).all():
-        log.info("the covariance of the model %r is not that of its names", model.name)
-        return ()
+    names, covariance = fitted
+    columns = [layout.names.index(name) for name in names]
     values = layout.initial()
     x = layout.coordinates(values)
     natural = np.array([q.logarithmic for q in layout.quantities])

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dearig.analysis.outcomes import ValidateOutcome
+from dearig.analysis.readings.band import with_bands
 from dearig.analysis.readings.compare import compare
 from dearig.analysis.readings.opening import Source
 from dearig.analysis.readings.record import read_all
@@ -29,16 +30,16 @@ def validate_model(
     """
     given = model if isinstance(model, ModelFile) else load_model(model)
     opened, _ = read_all(recordings, drive)
-    comparisons = []
+    comparisons, used = [], []
     for i, readings in enumerate(opened):
         role = "train" if readings.recording.sha256 in given.fitted else "validation"
-        used = readings.held() if given.assumes_held_voltage else readings
-        comparisons.append(compare(used, given.model, role))
+        used.append(readings.held() if given.assumes_held_voltage else readings)
+        comparisons.append(compare(used[-1], given.model, role))
         progress("validation", (i + 1) / len(opened))
     return ValidateOutcome(
         title=f"{given.name} on {len(opened)} recording{'s' if len(opened) > 1 else ''}",
         kind=opened[0].kind,
         model_name=given.name,
         model_path="" if isinstance(model, ModelFile) else str(model),
-        comparisons=tuple(comparisons),
+        comparisons=with_bands(comparisons, used, given),
     )

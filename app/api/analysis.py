@@ -193,6 +193,7 @@ def simulate(
     *,
     rig_file: RigSource | None = None,
     voltage: str = "command",
+    band: bool = True,
 ) -> Prediction:
     """Compute what a model predicts under a recording or a sequence.
 
@@ -207,6 +208,8 @@ def simulate(
         Sample rate of a sequence.
     voltage : str
         Voltage of a recording that drives the model: ``command`` or ``monitor``.
+    band : bool
+        Compute the 95 % band, if the model has a covariance: two simulations for each parameter.
 
     Returns
     -------
@@ -223,10 +226,13 @@ def simulate(
     >>> import dearig
     >>> predicted = dearig.simulate("model.toml", "validation-a-0.4")
     >>> predicted.response.max()  # in m
+    >>> predicted.low95, predicted.high95, predicted.band.parameters
     """
     played = drive.loaded if isinstance(drive, Sequence) else drive
     settings = None if rig_file is None else load_rig(rig_file)[0]
-    found = simulate_model(as_model_file(model), played, rig_file=settings, voltage=voltage)
+    found = simulate_model(
+        as_model_file(model), played, rig_file=settings, voltage=voltage, band=band
+    )
     return Prediction(found)
 
 

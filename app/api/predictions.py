@@ -16,12 +16,16 @@ from dearig.extras import import_extra
 from dearig.recording.content.layout import UNITS
 from dearig.recording.reading.origin import Origin
 from dearig.report.figures.signals import signal_figure
+from dearig.report.text.bands import band_texts
 from dearig.report.text.numbers import seconds, significant
+from dearig.report.text.sentences import pull_in_text
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
+
+    from dearig.analysis.readings.band import PredictionBand
 
 __all__ = ["Prediction"]
 
@@ -59,11 +63,28 @@ class Prediction(HasFiles, HasPage):
     @property
     def response(self) -> np.ndarray:
         """The displacement in m from the loaded rest state, or the nominal stress in Pa."""
-        actuator = self.prediction.kind == "actuator"
-        return self.prediction.values["displacement" if actuator else "nominal_stress"]
+        return self.prediction.response
+
+    @property
+    def band(self) -> PredictionBand | None:
+        """The 95 % band of one reading and its parts; None where the model has no covariance.
+
+        ``half_width`` and ``parameters`` are (N,), ``noise`` and ``law`` numbers, in m or Pa.
+        """
+        return self.prediction.band
+
+    @property
+    def low95(self) -> np.ndarray | None:
+        """The lower end of the 95 % band (N,) in m or Pa; None where there is none."""
+        return None if self.band is None else self.response - self.band.half_width
+
+    @property
+    def high95(self) -> np.ndarray | None:
+        """The upper end of the 95 % band (N,) in m or Pa; None where there is none."""
+        return None if self.band is None else self.response + self.band.half_width
 
     def to_pandas(self) -> DataFrame:
-        """Return the values as a data frame.
+        """Return the values and the band as a data frame.
 
         Returns
         -------
@@ -76,21 +97,23 @@ class Prediction(HasFiles, HasPage):
             If pandas is not installed.
         """
         lib = import_extra("pandas", "notebook", "to_pandas")
-        values = dict(self.prediction.values)
+        values = self.prediction.columns
         index = lib.Index(values.pop("time"), name="time")
         frame: DataFrame = lib.DataFrame(values, index=index)
         frame.attrs["units"] = {name: UNITS[name] for name in values}
         return frame
 
     def plot(self) -> Figure:
-        """Plot the drive and the predicted response over time.
+        """Plot the drive, and the predicted response with its band, over time.
 
         Returns
         -------
         matplotlib.figure.Figure
             The figure, with axes in the units that its labels name.
         """
-        return signal_figure(self.prediction.kind, self.time, self.drive, model=self.response)
+        return signal_figure(
+            self.prediction.kind, self.time, self.drive, model=self.response, band=self.band
+        )
 
     def _writers(self) -> Writers:
         def save(out: Path, overwrite: bool) -> Path:
@@ -126,8 +149,7 @@ class Prediction(HasFiles, HasPage):
         ]
         if found.field_max is not None:
             rows.append(("true field", f"up to {significant(found.field_max * 1e-6)} MV/m"))
-            limit = "none: the springs stiffen first"
-            if found.pull_in is not None:
-                limit = f"{significant(found.pull_in * 1e-3)} kV"
-            rows.append(("static pull-in", limit))
-        return card(found.title, facts(rows), drawing(self.plot(), f"{found.title} over time"))
+            rows.append(("static pull-in", pull_in_text(found)))
+        said = () if self.band is None else band_texts(self.band, found.kind)
+        picture = drawing(self.plot(), f"{found.title} over time")
+        return card(found.title, facts(rows), picture, sentences=said)

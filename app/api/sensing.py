@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.analysis.readings.opening import Source
-from dearig.analysis.readings.sense import CHARGE_ERROR, SenseOutcome, save_sensed, sense_recording
+from dearig.analysis.readings.sense import SenseOutcome, save_sensed, sense_recording
 from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing
 from dearig.api.models import ModelSource, as_model_file
 from dearig.api.written import HasFiles, Writers
 from dearig.recording.json_file import write_json
 from dearig.report.figures.signals import signal_figure
-from dearig.report.sensed import sense_json, sensed_texts
+from dearig.report.sensed import sense_json, sense_sentences, sensed_texts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,7 @@ class SenseResult(HasFiles):
     @property
     def sentences(self) -> tuple[str, ...]:
         """How large the error is, and what would reduce it."""
-        return self.outcome.sentences
+        return sense_sentences(self.outcome)
 
     def plot(self) -> Figure:
         """Plot the voltage, and the displacement of the laser and of the film as its own sensor.
@@ -93,7 +93,7 @@ def sense(
     *,
     drive: str = "command",
     gain: float = 1.0,
-    gain_error: float = CHARGE_ERROR,
+    gain_error: float | None = None,
 ) -> SenseResult:
     """Compute the displacement from voltage and current alone, and compare it with the laser.
 
@@ -108,8 +108,9 @@ def sense(
         Voltage: ``command`` or ``monitor``.
     gain : float
         Charge over that of the model, as the laser of another recording of this rig gave it.
-    gain_error : float
-        Relative standard uncertainty of the gain.
+    gain_error : float, optional
+        Relative standard uncertainty of the gain; by default what the recording's rig file states
+        of the scales and the film, and 1 % for each scale of which it states none.
 
     Returns
     -------

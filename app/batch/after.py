@@ -11,12 +11,13 @@ from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
 from dearig.analysis.outcomes import save_fitted_model
 from dearig.analysis.validate import validate_model
-from dearig.batch.numbers import numbers_of
+from dearig.batch.numbers import conditions_of, numbers_of
 from dearig.config.campaignfile import Band, Campaign
 from dearig.config.modelfile import ModelFile, load_model
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError, Interrupted
 from dearig.progress import Progress, quiet
+from dearig.recording.reading.reader import open_recording
 
 __all__ = ["AfterRun", "Compute", "band_violation", "compute"]
 
@@ -49,9 +50,10 @@ def compute(
 ) -> AfterRun:
     """Do what the plan of ``campaign`` asks for after a run.
 
-    The recording is first compared with ``last_model`` (a file in ``folder``), which it has not
-    been fitted to, and then fitted. What cannot be computed is a problem that is noted; the
-    campaign goes on. Raises ``Interrupted`` for a diagnosis that the operator ended.
+    Peak displacement, temperature and humidity of the room are read in any case. The recording is
+    first compared with ``last_model`` (a file in ``folder``), which it has not been fitted to, and
+    then fitted. What cannot be computed is a problem that is noted; the campaign goes on. Raises
+    ``Interrupted`` for a diagnosis that the operator ended.
     """
     found = AfterRun()
 
@@ -82,7 +84,11 @@ def compute(
             raise Interrupted("interrupted during the diagnosis after a run, at 0 V")
         found.numbers |= numbers_of(outcome)
 
+    def look() -> None:
+        found.numbers |= conditions_of(open_recording(recording))
+
     steps: tuple[tuple[str, bool, Callable[[], None]], ...] = (
+        ("peak and room", True, look),
         ("validate", campaign.validate, validate),
         ("identify", campaign.identify, identify),
         ("diagnose", campaign.diagnose, diagnose),

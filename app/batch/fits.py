@@ -19,14 +19,12 @@ from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import dearig
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
 from dearig.analysis.loops import cycle_edges
 from dearig.analysis.validate import validate_model
-from dearig.batch.numbers import errors_of, parameters_of
+from dearig.batch.numbers import errors_of, parameters_of, peaks_of
 from dearig.config.modelfile import load_model
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
@@ -205,7 +203,7 @@ def about(recording: Recording) -> Row:
         "samples": recording.samples,
         "complete": recording.complete,
         "cycles": _cycles(recording),
-        **_peaks(recording),
+        **peaks_of(recording),
     }
 
 
@@ -213,21 +211,6 @@ def _cycles(recording: Recording) -> int | None:
     """Return the number of cycles of the commanded voltage, valley to valley; None for a film."""
     voltage = recording.voltage_command
     return None if voltage is None else max(len(cycle_edges(voltage)) - 1, 0)
-
-
-def _peaks(recording: Recording) -> Row:
-    if recording.kind != "actuator":
-        return {}
-    return {
-        "peak_voltage_kV": _peak(recording.voltage_command, 1e-3),
-        "peak_displacement_mm": _peak(recording.displacement, 1e3),
-    }
-
-
-def _peak(values: np.ndarray | None, factor: float) -> float | None:
-    """Return the value of the largest size times ``factor``, with its sign; None without any."""
-    known = values[np.isfinite(values)] if values is not None else np.empty(0)
-    return float(known[np.argmax(np.abs(known))]) * factor if known.size else None
 
 
 def _computed(recording: Recording, options: StudyOptions, progress: Progress) -> Row:

@@ -6,10 +6,20 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+import numpy as np
+
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
+from dearig.recording.reading.recording import Recording
 from dearig.units import SHOWN, parameter_key, parameter_unit
 
-__all__ = ["errors_of", "numbers_of", "parameter_of", "parameters_of"]
+__all__ = [
+    "conditions_of",
+    "errors_of",
+    "numbers_of",
+    "parameter_of",
+    "parameters_of",
+    "peaks_of",
+]
 
 
 def parameters_of(outcome: IdentifyOutcome | DiagnoseOutcome) -> list[dict[str, Any]]:
@@ -51,6 +61,29 @@ def errors_of(comparison: Comparison) -> dict[str, float]:
         f"max_{shown.suffix}": errors.max * shown.error_factor,
     }
     return {name: float(value) for name, value in found.items() if math.isfinite(value)}
+
+
+def peaks_of(recording: Recording) -> dict[str, float | None]:
+    """Return the largest voltage in kV and displacement in mm, with their signs; {} of a film."""
+    if recording.kind != "actuator":
+        return {}
+    return {
+        "peak_voltage_kV": _peak(recording.voltage_command, 1e-3),
+        "peak_displacement_mm": _peak(recording.displacement, 1e3),
+    }
+
+
+def _peak(values: np.ndarray | None, factor: float) -> float | None:
+    """Return the value of the largest size times ``factor``, with its sign; None without any."""
+    known = values[np.isfinite(values)] if values is not None else np.empty(0)
+    return float(known[np.argmax(np.abs(known))]) * factor if known.size else None
+
+
+def conditions_of(recording: Recording) -> dict[str, float]:
+    """Return the peak displacement of a run, and the means of its room; what is known of them."""
+    peak = peaks_of(recording).get("peak_displacement_mm")
+    found = {} if peak is None else {"peak_displacement_mm": peak}
+    return {**found, **recording.conditions}
 
 
 def numbers_of(

@@ -403,29 +403,52 @@ def simulate(
         DriveChannel,
         typer.Option(help="Voltage of a recording that drives the model."),
     ] = DriveChannel.command,
+    band: Annotated[
+        bool,
+        typer.Option(
+            help="Compute the 95 % band by the errors of parameters, readings and law; two "
+            "simulations for each parameter."
+        ),
+    ] = True,
     rig_file: RigFileOption = None,
+    report: Report = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Compute what a model predicts under a recorded or planned drive."""
+    """Compute what a model predicts under a recorded or planned drive, with its 95 % band."""
     from dearig.analysis.simulate import save_prediction, simulate_model
     from dearig.config.rigfile import load_rig_file
+    from dearig.report.text.bands import NO_BAND, band_json, band_texts
+    from dearig.report.text.sentences import pull_in_text
 
-    check_files(force, (model, drive, rig_file), out, json=json)
+    check_files(force, (model, drive, rig_file), out, *optional(report), json=json)
     with working(json) as (console, _):
         prediction = simulate_model(
             model,
             drive,
             rig_file=load_rig_file(rig_file),
             voltage=voltage.value,
+            band=band,
         )
         written = save_prediction(prediction, out, force)
+        if report is not None:
+            from dearig.api.predictions import Prediction
+
+            Prediction(prediction).to_html(report)
     print_line(console, str(written))
+    if report is not None:
+        print_line(console, f"Report: {report}")
+    if prediction.band is not None:
+        for text in band_texts(prediction.band, prediction.kind):
+            print_line(console, text)
+    elif band:
+        print_line(console, NO_BAND)
     if prediction.field_max is not None:
-        limit = "no static pull-in if the springs stiffen as the model's locking limits have it"
-        if prediction.pull_in is not None:
-            limit = f"static pull-in at {prediction.pull_in * 1e-3:.3g} kV"
-        print_line(console, f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; {limit}")
+        print_line(
+            console,
+            f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; static pull-in: "
+            f"{pull_in_text(prediction)}",
+        )
     write_result(
         {
             "format": "dearig-simulation/1",
@@ -434,6 +457,8 @@ def simulate(
             "out": str(written),
             "true_field_max_V_per_m": prediction.field_max,
             "pull_in_voltage_V": prediction.pull_in,
+            "locking_limits_not_determined": list(prediction.open_limits),
+            "band": band_json(prediction.band, prediction.kind),
         },
         json,
     )
@@ -459,7 +484,7 @@ def sense(
         float | None,
         typer.Option(
             help="Relative standard uncertainty of the gain.",
-            show_default="0.014: 1 % of the current and of the voltage",
+            show_default="what the rig file states of the scales, else 1 % for each",
         ),
     ] = None,
     out: Annotated[
@@ -474,7 +499,7 @@ def sense(
     Gives its standard error, and compares it with the laser. Takes rows that are means ([card]
     average) and a voltage that comes back to 0 V.
     """
-    from dearig.analysis.readings.sense import CHARGE_ERROR, save_sensed, sense_recording
+    from dearig.analysis.readings.sense import save_sensed, sense_recording
     from dearig.report.sensed import sense_json, sensed_texts
 
     check_files(force, (recording, model), *optional(out), json=json)
@@ -484,7 +509,7 @@ def sense(
             model,
             drive=drive.value,
             gain=gain,
-            gain_error=CHARGE_ERROR if gain_error is None else gain_error,
+            gain_error=gain_error,
         )
         if out is not None:
             save_sensed(outcome, out, force)

@@ -25,7 +25,7 @@ from dearig.report.text.diagnosis import (
     warnings,
 )
 from dearig.report.text.estimates import effect_table
-from dearig.report.text.laws import bounds_table, effect_named, law_lines
+from dearig.report.text.laws import bounds_table, effect_named, law_lines, place_text
 from dearig.report.text.numbers import to_ascii
 from dearig.report.text.sentences import identify_summary, listed, validate_summary, warnings_of
 from dearig.report.text.tables import (
@@ -186,7 +186,7 @@ def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
 def law_pieces(effect: Effect) -> RenderableType:
     """Return the equations of an effect, its parameters with bounds, and its source."""
     found: list[_Piece] = [
-        f"{effect.name}: {family_label(effect.family)}, acts on the {effect.acts_on}",
+        f"{effect.name}: {family_label(effect.family)}, acts {place_text(effect.acts_on)}",
         f"{effect.summary[:1].upper()}{effect.summary[1:]}.",
         *law_lines(effect),
         bounds_table(effect),

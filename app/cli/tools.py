@@ -212,7 +212,7 @@ def effects(
     from dearig.cli.terminal import law_pieces
     from dearig.model.effects import EFFECTS
     from dearig.report.text.diagnosis import family_label
-    from dearig.report.text.laws import effect_named, law_json
+    from dearig.report.text.laws import effect_named, law_json, place_text
 
     check_files(force, (), json=json)
     console = console_for(json)
@@ -225,7 +225,9 @@ def effects(
     for family, members in groupby(listed, key=lambda e: e.family):
         print_line(console, family_label(family).capitalize(), "bold")
         for effect in members:
-            print_line(console, f"  {effect.name} (acts on the {effect.acts_on}): {effect.summary}")
+            print_line(
+                console, f"  {effect.name} (acts {place_text(effect.acts_on)}): {effect.summary}"
+            )
     print_line(console, 'Equations of one: dearig effects "NAME"')
     result = {"format": "dearig-effects/1", "effects": [law_json(e) for e in listed]}
     write_result(result, json)

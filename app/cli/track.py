@@ -61,7 +61,10 @@ def track(
     iterations: Annotated[
         int,
         typer.Option(
-            min=0, max=50, help="Runs that learn from the one before; 0 plays the model's voltage."
+            min=0,
+            max=50,
+            help="Runs that learn from the one before, at most: they end once nothing more is "
+            "learned. 0 plays the model's voltage.",
         ),
     ] = 5,
     compare: Annotated[

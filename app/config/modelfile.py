@@ -30,8 +30,10 @@ from dearig.model.springs import LIMIT, SPRING_LAWS, SPRINGS
 from dearig.recording.files import check_output, replaced_when_done
 
 __all__ = [
+    "COVARIANCE",
     "FORMAT",
     "HELD_VOLTAGE",
+    "PREDICTION",
     "ModelFile",
     "SpringName",
     "load_actuator",
@@ -55,6 +57,8 @@ else:
 
 #: Key of a model's history: whether the voltage was assumed to be held between the samples.
 HELD_VOLTAGE = "voltage_held"
+#: Keys of the covariance of the fitted parameters, and of what else is known of predictions.
+COVARIANCE, PREDICTION = "covariance", "prediction"
 
 
 @dataclass(frozen=True)

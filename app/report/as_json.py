@@ -16,6 +16,7 @@ from dearig.analysis.outcomes import (
 from dearig.model.verdict import COMPLETE, STOPPED, is_rejected, smallest_p
 from dearig.report.made import made_now
 from dearig.report.stored import Outcome, stored
+from dearig.report.text.bands import band_json
 from dearig.report.text.laws import effect_named, law_json
 from dearig.report.text.sentences import warnings_of
 from dearig.units import SHOWN
@@ -181,8 +182,14 @@ def _comparison_json(comparison: Comparison) -> dict[str, Any]:
         "published": _published_json(comparison.published),
         "ended_early": _end_json(comparison),
         "channels": _channels_json(comparison.channels),
+        "band": _band_json(comparison),
         "warnings": list(comparison.warnings),
     }
+
+
+def _band_json(comparison: Comparison) -> dict[str, Any] | None:
+    error = comparison.measured - comparison.model
+    return band_json(comparison.band, comparison.kind, error)
 
 
 def _channels_json(channels: tuple[ChannelResult, ...]) -> list[dict[str, Any]]:
@@ -356,6 +363,10 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         },
         "experiment_words": outcome.experiment_words,
         "excitation": _excitation_json(outcome),
+        "bands": {
+            c.name: _band_json(c)
+            for c in (outcome.after if outcome.recommends_final else outcome.before).validation
+        },
         "rounds": [
             {
                 "base": list(r.base),

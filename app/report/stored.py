@@ -255,6 +255,7 @@ def _any(plain: Any) -> Any:
 @cache
 def _hints(kind: type) -> dict[str, Any]:
     """Return the annotations of ``kind``, with those names that only a type checker imports."""
+    from dearig.analysis.readings import band
     from dearig.config import modelfile
     from dearig.model import fitting, residual
     from dearig.model.diagnosis import events, excitation, results
@@ -264,8 +265,8 @@ def _hints(kind: type) -> dict[str, Any]:
 
     names: dict[str, Any] = {}
     for module in (
-        modelfile, fitting, channels, residual, events, excitation, results, measures, early_end,
-        origin,
+        band, modelfile, fitting, channels, residual, events, excitation, results, measures,
+        early_end, origin,
     ):  # fmt: skip
         names |= vars(module)
     return typing.get_type_hints(kind, localns=names)

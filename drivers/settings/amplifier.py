@@ -63,6 +63,12 @@ class AmplifierSettings(Section):
         le=100.0,
         description="scaling of the current monitor: volts per milliampere",
     )
+    current_monitor_V_per_mA_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=100.0,
+        description="standard uncertainty of current_monitor_V_per_mA; 0 if not known",
+    )
     slew_V_per_us: float = Field(
         default=900.0, gt=0.0, le=1e5, description="slew rate of the amplifier without load"
     )
@@ -76,8 +82,8 @@ class AmplifierSettings(Section):
         default=20.0,
         ge=0.1,
         le=1e4,
-        description="simulated rig only: bandwidth of the current monitor (-3 dB), modelled as "
-        "first order; amplifiers have some kHz to 20 kHz",
+        description="bandwidth of the current monitor (-3 dB), modelled as first order; amplifiers "
+        "have some kHz to 20 kHz",
     )
     cable_pF: float = Field(
         default=0.0,

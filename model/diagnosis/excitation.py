@@ -25,11 +25,14 @@ __all__ = [
     "BANDS",
     "LEVELS",
     "Band",
+    "Beyond",
     "Excitation",
     "Motion",
+    "Shown",
     "Tested",
     "excitation",
     "range_of",
+    "shown_by",
 ]
 
 #: Where training shows too little.
@@ -118,13 +121,7 @@ class Excitation:
 
         Without them, what is left open would be noise.
         """
-        left, found = sum(b.open for b in self.bands), []
-        for band in sorted(self.bands, key=lambda b: -b.open):
-            if left <= _ALLOWED:
-                break
-            found.append(band)
-            left -= band.open
-        return tuple(sorted(found, key=lambda b: b.low))
+        return _undetermined(self.bands)
 
     @property
     def share(self) -> float:
@@ -164,14 +161,74 @@ class Tested:
     high: float
 
 
+@dataclass(frozen=True)
+class Beyond:
+    """Where a recording goes beyond what training has shown.
+
+    ``levels``: to voltages or displacements that training does not reach. ``bands`` are those of
+    frequency that training does not determine.
+    """
+
+    levels: bool
+    bands: tuple[Band, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What training recordings have shown, also without them.
+
+    ``energies`` (B,) are their sums of squares in units of the noise in bands with ``edges``
+    (B + 1,) Hz. They reach ``voltage`` V, and displacements from ``low`` to ``high`` m.
+    """
+
+    edges: np.ndarray
+    energies: np.ndarray
+    voltage: float
+    low: float
+    high: float
+
+    def further(self, asked: Motion) -> np.ndarray:
+        """Return where ``asked`` goes to levels that training does not reach, (N,) bool."""
+        further = np.abs(asked.drive) > _LEVEL_RATIO * self.voltage
+        further |= asked.response < self.low - asked.noise
+        return np.asarray(further | (asked.response > self.high + asked.noise))
+
+    def beyond(self, asked: Motion) -> Beyond | None:
+        """Return where ``asked`` goes beyond training; None where it does not."""
+        edges, shown = self.edges, self.energies
+        if 0.5 / asked.step > edges[-1]:
+            # faster than any training recording was sampled
+            edges, shown = np.append(edges, 0.5 / asked.step), np.append(shown, 0.0)
+        asks = asked.energies(edges) / asked.response.size
+        known = _known(shown)
+        bands = tuple(
+            Band(float(low), float(high), math.sqrt(a), float(k), 0.0)
+            for low, high, a, k in zip(edges[:-1], edges[1:], asks, known, strict=True)
+        )
+        found = Beyond(bool(self.further(asked).any()), _undetermined(bands))
+        return found if found.levels or found.bands else None
+
+
+def shown_by(train: Sequence[Motion], edges: np.ndarray | None = None) -> Shown:
+    """Return what the recordings ``train`` have shown, in bands with ``edges`` (B + 1,) Hz."""
+    edges = _edges(train) if edges is None else edges
+    return Shown(
+        edges,
+        np.sum([motion.energies(edges) for motion in train], axis=0),
+        max(float(np.max(np.abs(m.drive))) for m in train),
+        min(float(np.min(m.response)) for m in train),
+        max(float(np.max(m.response)) for m in train),
+    )
+
+
 def excitation(train: Sequence[Motion], asked: Motion, error: np.ndarray) -> Excitation:
     """Return what the recording ``asked`` asks beyond ``train``.
 
     ``error`` (N,) m is measured minus model there, NaN where a reading must not be used.
     """
     edges = _edges([*train, asked])
-    shown = np.sum([motion.energies(edges) for motion in train], axis=0)
-    known = _known(shown)
+    shown = shown_by(train, edges)
+    known = _known(shown.energies)
     size = asked.response.size
     good = np.isfinite(error)
     left = np.where(good, error, 0.0)
@@ -184,15 +241,10 @@ def excitation(train: Sequence[Motion], asked: Motion, error: np.ndarray) -> Exc
             edges[:-1], edges[1:], asks, known, errs, noise * np.mean(good), strict=True
         )
     )
-    highest = _LEVEL_RATIO * max(float(np.max(np.abs(m.drive))) for m in train)
-    nearest = min(float(np.min(m.response)) for m in train) - asked.noise
-    farthest = max(float(np.max(m.response)) for m in train) + asked.noise
-    further = np.abs(asked.drive) > highest
-    further |= (asked.response < nearest) | (asked.response > farthest)
     power = np.where(good, (left / asked.noise) ** 2 - 1.0, 0.0)
     total = float(np.sum(power))
-    above = float(np.sum(power[further])) / total if total > 0.0 else 0.0
-    return Excitation(asked.name, bands, tuple(shown.tolist()), above)
+    above = float(np.sum(power[shown.further(asked)])) / total if total > 0.0 else 0.0
+    return Excitation(asked.name, bands, tuple(shown.energies.tolist()), above)
 
 
 def range_of(motions: Iterable[Motion]) -> Tested:
@@ -209,6 +261,17 @@ def range_of(motions: Iterable[Motion]) -> Tested:
         max(float(edges[first]), 1.0 / max(m.step * m.response.size for m in every)),
         float(edges[last + 1]),
     )
+
+
+def _undetermined(bands: Sequence[Band]) -> tuple[Band, ...]:
+    """Return those of ``bands`` without which what training leaves open would be noise."""
+    left, found = sum(b.open for b in bands), []
+    for band in sorted(bands, key=lambda b: -b.open):
+        if left <= _ALLOWED:
+            break
+        found.append(band)
+        left -= band.open
+    return tuple(sorted(found, key=lambda b: b.low))
 
 
 def _known(shown: np.ndarray) -> np.ndarray:

@@ -67,6 +67,7 @@ _COARSE_SAMPLES = 1500  # of a film record
 _MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
 _LEADERS = 2  # starts that are followed to their ends
+_GAIN_LEFT = 0.1  # of the gain that counts: where a fit ends that is reported
 _RESOLVED = 0.2  # of a mean's interval: the shortest relaxation time of a search on means
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
 # Of an interval's width, which means and quicker steps may change: it changes a coverage of 95 %
@@ -456,7 +457,7 @@ def fit_globally(
                 first = layout.fixed
                 x = _descend_on_means(problem, coarse, freed.x, first)
     descents.ended()
-    fit = descend(problem, x, first, damping=1e-4)
+    fit = descend(problem, x, first, gain=_little_gain(problem, x), damping=1e-4)
     problem.on_simulations = counted
     progress("descents", 1.0)
     problem.simulations += coarse.simulations
@@ -493,7 +494,7 @@ def _descend_on_means(
     x, cost = start, float(problem.costs(start[None])[0])
     for _ in range(_CORRECTIONS_MAX):
         recentre(means, problem, problem.layout.values(x))
-        moved = descend(means, x, held, damping=1e-4).x
+        moved = descend(means, x, held, gain=_little_gain(problem, x), damping=1e-4).x
         reached = float(problem.costs(moved[None])[0])
         gained = (cost - reached) * problem.samples
         if gained > 0.0:
@@ -501,6 +502,12 @@ def _descend_on_means(
         if gained < gain_that_counts(cost * problem.samples, problem.samples):
             break
     return x
+
+
+def _little_gain(problem: Problem, x: np.ndarray) -> float:
+    """Return the gain in chi-square of ``problem`` near ``x`` (d,) that ends the last descents."""
+    chi2 = float(problem.costs(x[None])[0]) * problem.samples
+    return _GAIN_LEFT * gain_that_counts(chi2, problem.samples)
 
 
 def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: int) -> bool:

@@ -11,9 +11,11 @@ from dearig.model.fitting.problem import Problem
 
 __all__ = ["LocalFit", "descend", "gain_that_counts"]
 
-_DAMPINGS = np.array([1e-4, 1e-2, 1.0, 30.0])  # tried at once, relative to the current damping
+# tried at once, relative to the current one: a step ten times too long leaves a narrow valley
+_DAMPINGS = np.array([0.03, 0.3, 3.0, 30.0])
 _DAMPING_MIN, _DAMPING_MAX = 1e-12, 1e8
 _GAIN_MIN = 0.1  # of chi-square: a third of a standard deviation of any parameter
+_GAIN_LEFT = 0.01  # of the gain asked for: the step to so little is not taken
 _PROBE = 0.1  # of a step: length of the finite difference along it
 _BEND_MAX = 0.4  # of a step: a larger second-order part is left out
 _GAIN_MISFIT = 0.01  # of chi-square over the number of samples, where residuals exceed the noise
@@ -25,12 +27,11 @@ _FLAT = 1e-9  # of the scaled curvature: the data do not determine flatter direc
 class LocalFit:
     """End of a descent: coordinates ``x`` (d,), mean-square cost, residuals (N,).
 
-    ``jacobian`` (N, f) over the free coordinates is that of the last iteration: at ``x`` where the
-    descent converged, else one step before. ``to_gain`` is what the quadratic model at ``x`` would
-    still take off chi-square, 0 where there is none at ``x``. ``beside`` (N, b) are the columns of
-    other parameters where ``jacobian`` is, as far as they were asked for. ``starts`` are those of
-    the global search that led here, best first: the cost that each reached, and whether it was
-    followed to its end.
+    ``jacobian`` (N, f) over the free coordinates is that of the last iteration, at ``x`` or one
+    step before. ``to_gain`` is what the quadratic model at ``x`` would still take off chi-square, 0
+    where there is none at ``x``. ``beside`` (N, b) are the columns of other parameters where
+    ``jacobian`` is, as far as they were asked for. ``starts`` are those of the global search that
+    led here, best first: the cost that each reached, and whether it was followed to its end.
     """
 
     x: np.ndarray
@@ -65,7 +66,8 @@ def descend(
     population on all cores, each with its geodesic acceleration: the valleys of relaxation spectra
     are long, narrow and curved.
 
-    It ends when the quadratic model predicts a gain in chi-square of less than ``gain``, or when
+    It ends with the step for which the quadratic model predicts a gain in chi-square of less than
+    ``gain`` (not taken by a ``straight`` one: see ``LocalFit.to_gain``), or when
     ``patience`` iterations together gained less. Without a ``gain`` it is a tenth, or more where
     the residuals are far above the noise. ``damping`` is the first one, relative to the
     scaled curvature; near an optimum it may be small. ``quick`` takes one-sided differences at
@@ -108,7 +110,8 @@ def descend(
         enough = gain_that_counts(chi2, problem.samples) if gain is None else gain
         # gain that the quadratic model predicts, flat directions excepted
         predicted = float(np.sum(target**2 / np.maximum(w, _FLAT)))
-        if predicted < enough:
+        last = predicted < enough
+        if last and (straight or predicted < _GAIN_LEFT * enough):
             converged, to_gain = True, predicted
             break
         improved = False
@@ -119,7 +122,7 @@ def descend(
             steps = np.zeros((dampings.size, part.size))
             steps[:, move] = -((inverse * target) @ q.T) / safe[move]
             steps /= np.maximum(1.0, np.max(np.abs(steps) / reach, axis=1))[:, None]
-            if not straight:
+            if not (straight or last):
                 steps += _bend(problem, x, free, r, jac, steps, move, safe, q, inverse)
             trials = np.tile(x, (dampings.size, 1))
             trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
@@ -132,7 +135,9 @@ def descend(
                 damping = max(dampings[best], _DAMPING_MIN)
             else:
                 damping *= 1e3
-        if not improved:
+            if last:
+                break
+        if last or not improved:
             converged = True
             break
         history.append(chi2)

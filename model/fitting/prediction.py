@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,20 +15,28 @@ from dearig.model.readings.records import Record
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 
-__all__ = ["prediction_error", "prediction_gain"]
+__all__ = ["parameter_deviation", "prediction_error", "prediction_gain"]
+
+#: Bytes of the simulations of one pass, and of the derivatives that are kept, at most.
+_PASS_BYTES, _KEPT_BYTES = 2**28, 2**29
+_PER_SAMPLE = 32  # bytes of one film: motion, rate, reading, and a copy
 
 
-def prediction_error(
+def parameter_deviation(
     record: Record, model: Actuator | Strip, names: Sequence[str], covariance: np.ndarray
-) -> float:
-    """Return the RMS error in m or Pa of what ``model`` predicts of ``record``, 95 % bound.
+) -> np.ndarray:
+    """Return the standard deviation (N,) in m or Pa of what ``model`` predicts of ``record``.
 
-    It is the part that the parameters' own error makes, to first order, from the ``covariance``
-    (f, f) of the fitted parameters ``names``, in SI units. A direction that the fit did not
-    determine counts as far as the derivatives hold.
+    It is the part that the parameters' own error makes, to first order, J C J^T, from the
+    ``covariance`` C (f, f) of the fitted parameters ``names``, in SI units. Parameters that this
+    model does not have are left out. A direction that the fit did not determine counts as far as
+    the derivatives hold. Of very long records every few readings are computed, and lines between.
     """
     layout = FitLayout(model)
     free = np.isin(layout.names, names)
+    size = record.measured.size
+    if not free.any():
+        return np.zeros(size)
     order = [list(names).index(name) for name in np.array(layout.names)[free]]
     values = layout.initial()
     x = layout.coordinates(values)
@@ -36,10 +46,33 @@ def prediction_error(
     scaled = covariance[np.ix_(order, order)] / np.outer(natural * reach, natural * reach)
     variances, directions = np.linalg.eigh(scaled)
     lengths = np.sqrt(np.clip(variances, 0.0, 1.0))
-    problem = Problem([record], layout, workers=1)
-    jacobian = problem.jacobian(x, free) * reach
-    moved = jacobian @ (directions * lengths)
-    return NORMAL_95 * record.noise * float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
+    # nothing is fitted to what is predicted: no offset, and no reading without weight
+    problem = Problem([replace(record, valid=None)], layout, workers=1, exact_zero=True)
+    every = -(-size * reach.size * 8 // _KEPT_BYTES)
+    kept = np.empty((-(-size // every), reach.size))
+    columns = np.flatnonzero(free)
+    # two films for each column
+    together = max(1, (_PASS_BYTES // (_PER_SAMPLE * size) - 1) // 2)
+    for start in range(0, columns.size, together):
+        part = np.zeros_like(free)
+        part[columns[start : start + together]] = True
+        kept[:, start : start + together] = problem.jacobian(x, part)[::every]
+    moved = (kept * reach) @ (directions * lengths)
+    deviation = record.noise * np.sqrt(np.sum(moved**2, axis=1))
+    if every > 1:
+        deviation = np.interp(np.arange(size), np.arange(0, size, every), deviation)
+    return np.asarray(deviation)
+
+
+def prediction_error(
+    record: Record, model: Actuator | Strip, names: Sequence[str], covariance: np.ndarray
+) -> float:
+    """Return the RMS error in m or Pa of what ``model`` predicts of ``record``, 95 % bound.
+
+    It is the part that the parameters' own error makes, as of ``parameter_deviation``.
+    """
+    deviation = parameter_deviation(record, model, names, covariance)
+    return NORMAL_95 * math.sqrt(float(np.mean(deviation**2)))
 
 
 def prediction_gain(before: np.ndarray, after: np.ndarray, noise: float) -> float:

@@ -24,6 +24,7 @@ from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 from dearig.recording.reading.reader import open_recording
+from dearig.report.pages.track import track_json, track_summary, write_track_report
 
 PATH = """\
 name = "path"
@@ -97,6 +98,23 @@ def test_a_wrong_model_learns(learned):
     assert learned.runs[0].rms > 5.0 * ours[-1].rms
     assert not learned.runs[1].notes  # the worse model is not followed
     assert learned.status == "complete"
+
+
+def test_runs_end_once_nothing_more_is_learned(tmp_path):
+    """The film is right, so that the first run leaves noise; the page has the model's band."""
+    table = {"names": ["mu_0"], "matrix": [[50.0**2]]}
+    model = ModelFile("exact", MODEL.model, {"covariance": table})
+    outcome = followed(tmp_path / "out", model, iterations=3)
+    (run,) = outcome.runs
+    assert outcome.status == "complete"
+    assert outcome.reason == "the error is noise: nothing more is learned, and its voltage is kept"
+    assert f"Not all runs were needed: {outcome.reason}." in track_summary(outcome)
+    assert outcome.band.noise == run.noise
+    told = track_json(outcome)["band"]
+    assert told["parameters_um"] == pytest.approx(outcome.band.parameters_rms * 1e6)
+    page = write_track_report(outcome, tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "what the model predicts of its own first run" in page
+    assert replace(outcome, runs=()).band is None
 
 
 def test_a_target_is_followed_in_means_of_conversions(tmp_path):

@@ -129,7 +129,8 @@ class TestSimulate:
     def test_a_prediction_is_a_table_a_figure_and_a_file(self, fit, tmp_path: Path) -> None:
         made = dearig.simulate(fit, "validation-a-1.0", rig_file=SLOW_RIG)
         frame = made.to_pandas()
-        assert frame.attrs["units"] == {"voltage_command": "V", "displacement": "m"}
+        units = frame.attrs["units"]
+        assert (units["voltage_command"], units["displacement"]) == ("V", "m")
         np.testing.assert_array_equal(frame["displacement"], made.response)
         again = dearig.open(made.save(tmp_path / "p.h5"))
         np.testing.assert_array_equal(again.displacement, made.response)
@@ -138,6 +139,30 @@ class TestSimulate:
         for part in ("true field", "pull-in", "<svg"):
             assert part in html
         assert made.to_html(tmp_path / "p.html").is_file()
+
+    def test_a_prediction_has_its_band_as_arrays_and_in_its_files(
+        self, run, fit, tmp_path: Path
+    ) -> None:
+        made = dearig.simulate(fit, run)
+        assert made.band is not None
+        half = made.band.half_width
+        np.testing.assert_allclose(made.high95 - made.low95, 2.0 * half)
+        assert made.band.noise == pytest.approx(fit.errors[run.name].noise_floor * 1e-6, rel=1e-6)
+        assert made.band.law_of == "training"
+        # of what was fitted, by noise and law together
+        assert np.mean(np.abs(run.displacement - made.response) <= half) > 0.9
+        again = dearig.open(made.save(tmp_path / "p.h5")).to_pandas()
+        np.testing.assert_array_equal(again["displacement_low95"], made.low95)
+        np.testing.assert_array_equal(again["displacement_sd_parameters"], made.band.parameters)
+        head = made.save(tmp_path / "p.csv").read_text().splitlines()[0].split(",")
+        assert head[3:] == [
+            "displacement_low95_mm", "displacement_high95_mm", "displacement_sd_parameters_mm",
+            "displacement_sd_noise_mm", "displacement_sd_law_mm",
+        ]  # fmt: skip
+        assert "95 % band of a reading." in made._repr_html_()
+        assert len(made.plot().axes) == 3
+        bare = dearig.simulate(fit, run, band=False)
+        assert (bare.band, bare.low95, bare.high95) == (None, None, None)
 
 
 class TestDiagnose:

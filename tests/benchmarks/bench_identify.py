@@ -1,11 +1,20 @@
-"""How long an identification takes: the thesis's Algorithm 1 as printed, and the hybrid method.
+"""How long an identification takes: hybrid beside Algorithm 1, and this revision beside another.
 
-Run as ``python -m tests.benchmarks.bench_identify``. One period of the thesis's identification
-record at its 10 ms sampling, made by Table 3's film, with 1 um of noise. Algorithm 1 runs once for
-each of three seeds, the hybrid three times; medians, on a machine that may have other work.
+Run as ``python -m tests.benchmarks.bench_identify [PYTHON]``. Without an argument: one period of
+the thesis's identification record at its 10 ms sampling, made by Table 3's film, with 1 um noise.
+Algorithm 1 as printed runs once for each of three seeds, the hybrid three times; medians, on a
+machine that may have other work.
+
+``PYTHON`` is the interpreter of another checkout's environment. Then the two take turns, each in a
+process of its own, on one thread: the thesis's record of two periods and of five at 1 kHz, with
+intervals and without. Processor seconds, ratios turn by turn, and the costs that are reached.
 """
 
+import json
+import os
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 
@@ -21,6 +30,51 @@ from dearig.model.simulation.excitation import Sequence
 
 NOISE = 1e-6
 STEP = 0.01
+TURNS = 3
+
+
+def measured() -> dict[str, tuple[float, float]]:
+    """Return processor seconds and cost of each identification, by this interpreter."""
+    actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+
+    def record(periods: int, rate: float) -> ActuatorRecord:
+        drive = Drive(*Sequence.thesis(periods=periods).sample(rate), hold=True)
+        noise = NOISE * np.random.default_rng(0).standard_normal(drive.time.size)
+        moved = actuator.simulate(drive).displacement
+        return ActuatorRecord("made", drive, moved + noise, NOISE)
+
+    identify([record(1, 100.0)], actuator, workers=1)  # compiles
+    found = {}
+    for periods in (2, 5):
+        made = record(periods, 1e3)
+        for intervals in (False, True):
+            before = time.process_time()
+            fit = identify([made], actuator, workers=1, intervals=intervals)
+            name = f"{made.time[-1]:.0f} s, {'with' if intervals else 'without'} intervals"
+            found[name] = (time.process_time() - before, fit.cost)
+    return found
+
+
+def beside(other: str) -> None:
+    """Print what ``measured`` returns of the interpreter ``other`` and of this one, in turns."""
+    one_thread = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    turns: list[list[dict[str, list[float]]]] = [[], []]
+    for _ in range(TURNS):
+        for of, interpreter in zip(turns, (other, sys.executable), strict=True):
+            answer = subprocess.run(
+                [interpreter, __file__, "measure"],
+                check=True, capture_output=True, text=True, env=one_thread,
+            )  # fmt: skip
+            of.append(json.loads(answer.stdout.splitlines()[-1]))
+    print(f"{'processor s':<28}{'other':>8}{'this':>8}{'ratio of each turn':>28}{'costs':>26}")
+    for name in turns[0][0]:
+        then, now = ([one[name] for one in of] for of in turns)
+        ratios = [b[0] / a[0] for a, b in zip(then, now, strict=True)]
+        print(
+            f"{name:<28}{statistics.median(t[0] for t in then):>8.2f}"
+            f"{statistics.median(t[0] for t in now):>8.2f}"
+            f"{', '.join(f'{r:.2f}' for r in ratios):>28}{then[0][1]:>13.7f}{now[0][1]:>13.7f}"
+        )
 
 
 def main() -> None:
@@ -62,4 +116,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:] == ["measure"]:
+        print(json.dumps(measured()))
+    elif sys.argv[1:]:
+        beside(sys.argv[1])
+    else:
+        main()

@@ -18,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+#: Rows of the file that is read first: so many that what is compiled is used for it too.
+WARM = 700_000
 COLUMNS = ("time_s", "voltage_V", "displacement_mm")
 
 
@@ -108,7 +110,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(dir=asked.folder) as made:
         whole, spoilt, warm = (Path(made) / f"{n}.csv" for n in ("whole", "spoilt", "warm"))
         write(whole, asked.rows)
-        write(warm, 5000)
+        write(warm, WARM)
         spoil(whole, spoilt)
         columns = 8 * len(COLUMNS) * asked.rows
         print(f"{asked.rows:,} rows, {whole.stat().st_size / 1e6:.0f} MB, {asked.repeats} rounds")

@@ -244,17 +244,23 @@ def _processor_seconds() -> float:
 
 
 def diagnose(
-    train: Sequence[Path], validation: Sequence[Path], out: Path, bare: bool = False
+    train: Sequence[Path],
+    validation: Sequence[Path],
+    out: Path,
+    bare: bool = False,
+    model: Path | None = None,
 ) -> tuple[dict[str, Any] | None, str, float]:
     """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took.
 
-    With ``bare`` the intervals of parameters are left out.
+    With ``bare`` the intervals of parameters are left out. The model is written to ``model``.
     """
     program = ["tests.blind.bare"] if bare else ["dearig", "diagnose"]
     command = [sys.executable, "-m", *program, *map(str, train)]
     for path in validation:
         command += ["--validate", str(path)]
     command += ["--json", str(out)]
+    if model is not None:
+        command += ["--model-out", str(model)]
     started = time.perf_counter()
     try:
         ended = subprocess.run(

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import dearig as api
+from dearig.analysis.readings.scales import scale_errors
+from dearig.recording import open_recording
 from tests.tools.command import dearig, done, film_model, refused, thesis_model, write
 
 LOBES = """\
@@ -54,9 +56,13 @@ def sense(folder: Path, name: str, *options: str | Path) -> tuple[dict, str]:
 def test_a_gain_from_one_recording_serves_for_another(folder: Path) -> None:
     first, text = sense(folder, "first")
     # the card converts at fixed times after each step of the output: a gain that is far from 1
-    assert first["coverage"] < 0.5
-    assert "more than the scale's uncertainty" in text
-    assert first["gain_by_laser"] == pytest.approx(1.1, abs=0.1)
+    weight = scale_errors(open_recording(folder / "first.h5")).weight
+    assert weight == pytest.approx(first["gain_by_laser"], abs=0.03)
+    assert weight > 1.05
+    assert first["gain_error"] == pytest.approx(np.hypot(weight - 1.0, np.sqrt(2.0) * 0.01))
+    assert first["coverage"] > 0.9
+    assert f"the readings are {weight:.3g} times the current" in text
+    assert "amplifier.gain_V_per_V_uncertainty or" in text
     gain = (
         "--gain",
         str(first["gain_by_laser"]),

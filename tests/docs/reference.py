@@ -24,7 +24,7 @@ from dearig.formulas import as_text
 from dearig.model.effects import EFFECTS, FAMILIES, ORIGINS, Effect
 from dearig.model.effects.registry import OURS
 from dearig.report.text.diagnosis import family_label
-from dearig.report.text.laws import other_symbols, parameter_meanings
+from dearig.report.text.laws import other_symbols, parameter_meanings, place_text
 
 FOLDER = Path(__file__).parents[2] / "app" / "docs" / "reference"
 
@@ -92,7 +92,9 @@ def effects() -> str:
 
 def _effect(effect: Effect) -> str:
     assert effect.law is not None
-    about = f"{effect.summary[:1].upper()}{effect.summary[1:]}. It acts on the {effect.acts_on}."
+    about = (
+        f"{effect.summary[:1].upper()}{effect.summary[1:]}. It acts {place_text(effect.acts_on)}."
+    )
     lines = [f"### {effect.name[:1].upper()}{effect.name[1:]}", about]
     lines += [f"```math\n{equation}\n```" for equation in effect.law.equations]
     rows = ["| symbol | parameter | meaning | unit | from | to |", "|---|---|---|---|---|---|"]

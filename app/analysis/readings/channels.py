@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.analysis.readings.faults import clipped
+from dearig.analysis.readings.scales import scale_errors
 from dearig.model.readings.channels import (
     CURRENT,
     CURRENT_UNIT,
@@ -75,7 +76,8 @@ def _channel(
     skew = {c.name: c.skew for c in recording.channels}.get(
         VOLTAGE_MONITOR if name == VOLTAGE_MONITOR else "current_monitor", 0.0
     )
-    return ChannelRecord(name, unit, values, noise, recording.quiet_samples, max(skew, 0.0))
+    error = scale_errors(recording).of_channel(name)
+    return ChannelRecord(name, unit, values, noise, recording.quiet_samples, max(skew, 0.0), error)
 
 
 def _is_clipped(values: np.ndarray, command: np.ndarray, noise: float) -> bool:

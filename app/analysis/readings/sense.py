@@ -9,20 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from dearig.analysis.readings.record import Readings
+from dearig.analysis.readings.scales import ScaleErrors, scale_errors
 from dearig.config.modelfile import ModelFile, load_model
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.readings.channels import CURRENT, GAIN_ERROR
+from dearig.model.readings.channels import CURRENT
 from dearig.model.readings.sensing import SHARES, Sensed, sense_displacement
 from dearig.model.simulation.actuator import Actuator
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.reading.reader import open_recording
 from dearig.recording.reading.recording import Recording
 
-__all__ = ["CHARGE_ERROR", "Agreement", "SenseOutcome", "save_sensed", "sense_recording"]
-
-#: Relative standard uncertainty of charge over voltage: the scales of both channels.
-CHARGE_ERROR = math.sqrt(2.0) * GAIN_ERROR
+__all__ = ["Agreement", "SenseOutcome", "save_sensed", "sense_recording"]
 
 # Hz, of conversions: monitors of amplifiers have 1 to 20 kHz; slower ones catch the peak of each
 # step of the output and not its mean
@@ -52,7 +50,9 @@ class SenseOutcome:
     """Displacement of a recording from voltage and current; arrays (N,) in SI units.
 
     ``laser`` is the measured displacement at the times of the rows. ``agreement`` is None where no
-    row has an estimate; ``sentences`` say how large the error is and what would reduce it.
+    row has an estimate. ``gain`` is charge over that of the model, ``gain_error`` its relative
+    standard uncertainty; ``scales`` are what that is from, None where a calibration gave it.
+    ``advised`` is the number of conversions a row at which rows are means of the current.
     """
 
     name: str
@@ -63,8 +63,11 @@ class SenseOutcome:
     sensed: Sensed
     average: int
     gain: float
+    gain_error: float
+    scales: ScaleErrors | None
     agreement: Agreement | None
-    sentences: tuple[str, ...]
+    advised: int
+    is_instantaneous: bool
 
 
 def sense_recording(
@@ -73,16 +76,17 @@ def sense_recording(
     *,
     drive: str = "command",
     gain: float = 1.0,
-    gain_error: float = CHARGE_ERROR,
+    gain_error: float | None = None,
 ) -> SenseOutcome:
     """Return the displacement that voltage and current of ``recording`` show by ``model``.
 
     ``drive`` is the voltage, command or monitor. ``gain`` is charge over that of the model's film,
-    as the laser of an earlier recording gave it. Raises ``InputError``.
+    as the laser of an earlier recording gave it. Without its ``gain_error`` that is what the rig
+    file states of the scales. Raises ``InputError``.
     """
     if not (math.isfinite(gain) and gain > 0.0):
         raise InputError(f"the gain is {gain:g}; it must be a number above 0", option="gain")
-    if not (math.isfinite(gain_error) and gain_error >= 0.0):
+    if gain_error is not None and not (math.isfinite(gain_error) and gain_error >= 0.0):
         raise InputError(
             f"the error of the gain is {gain_error:g}; it must be 0 or more", option="gain_error"
         )
@@ -103,7 +107,10 @@ def sense_recording(
             f"{opened.path}: its current cannot be used ({reason}); wire the amplifier's current "
             f"monitor to the card and record again"
         )
-    voltage = readings.voltage
+    voltage, scales = readings.voltage, None
+    if gain_error is None:
+        scales = scale_errors(opened)
+        gain_error = scales.of_charge(drive)
     try:
         sensed = sense_displacement(actuator, voltage, current, gain, gain_error)
     except ModelError as error:
@@ -128,8 +135,11 @@ def sense_recording(
         sensed=sensed,
         average=opened.average,
         gain=gain,
+        gain_error=gain_error,
+        scales=scales,
         agreement=agreement,
-        sentences=_sentences(sensed, agreement, opened, gain, gain_error),
+        advised=_advised(opened),
+        is_instantaneous=instantaneous,
     )
 
 
@@ -160,74 +170,9 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _um(length: float) -> str:
-    """Return a ``length`` in m as a person reads it, to three digits."""
-    return f"{float(f'{length * 1e6:.3g}'):g} um"
-
-
-def _sentences(
-    sensed: Sensed, agreement: Agreement | None, opened: Recording, gain: float, gain_error: float
-) -> tuple[str, ...]:
-    """Return how large the error is, and what would reduce it."""
-    average, held = opened.average, opened.hold
-    if agreement is None:
-        if average == 1 and held:
-            return (
-                f"No displacement: the readings carry {100.0 * sensed.share:.2g} % of the film's "
-                f"charge. After each step of the output the film charges within microseconds, "
-                f"between two readings. Record with [card] average = {_advised(opened)}: such "
-                f"rows are means, which contain the charging current.",
-            )
-        return (
-            f"No displacement: the noise of the current, {sensed.noise * 1e6:.3g} uA, is too large "
-            f"for a film that takes {sensed.scale * 1e6:.3g} uC. {_help(opened)}",
-        )
-    known = np.isfinite(sensed.displacement)
-    noise, common = _rms(sensed.noise_error[known]), _rms(sensed.gain_error[known])
-    least = float(np.min(sensed.standard_error[known]))
-    said = [
-        f"The standard error is {_um(agreement.error)} RMS ({_um(least)} at best): {_um(noise)} "
-        f"from the noise of the current and {_um(common)} from the scale of the charge "
-        f"({100.0 * gain_error:.2g} %), which is common to all rows.",
-    ]
-    if gain_error == CHARGE_ERROR:
-        said.append(
-            "That uncertainty is of the instruments' scales alone. A monitor that is read at fixed "
-            "moments after each step of the output has another scale: calibrate the gain with a "
-            "laser once."
-        )
-    if common > noise:
-        said.append(
-            "The scale is the larger part: take the gain that the laser of a recording gives for "
-            "the others of this rig."
-        )
-    else:
-        said.append(f"The noise is the larger part. {_help(opened)}")
-    off = abs(math.log(agreement.gain / gain))
-    if off > 3.0 * math.hypot(gain_error, agreement.gain_error or 0.0):
-        said.append(
-            f"By the laser the charge is {agreement.gain:.4g} times that of the model, more than "
-            f"the scale's uncertainty: the cable to the film charges too, the film has another "
-            f"thickness or permittivity, or the conversions are slower than the current monitor."
-        )
-    return tuple(said)
-
-
 def _advised(opened: Recording) -> int:
     """Return the conversions a row whose rate is ``_RATE``."""
     return max(1, math.ceil(_RATE * opened.duration / (opened.samples - 1) - 1e-6))
-
-
-def _help(opened: Recording) -> str:
-    advised, means = _advised(opened), ""
-    if opened.average < advised:
-        better = math.sqrt(advised / opened.average)
-        means = f"[card] average = {advised} divides it by {better:.2g}; "
-    return (
-        f"It is in proportion to noise/(C_0 V): {means}a film of twice the area, or one of half "
-        f"the thickness under the same voltage if it withstands that, halves it; a drive that is "
-        f"four times as fast halves it too."
-    )
 
 
 def save_sensed(outcome: SenseOutcome, out: str | Path, overwrite: bool = False) -> Path:

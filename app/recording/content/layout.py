@@ -47,6 +47,7 @@ from dearig.recording.content.text import fixed, put_text
 
 __all__ = [
     "AVERAGE_COLUMN",
+    "BAND_ENDINGS",
     "ENVIRONMENT_TYPE",
     "EVENT_LEVELS",
     "EVENT_TYPE",
@@ -99,6 +100,18 @@ REQUIRED = MappingProxyType(
     }
 )
 
+#: Endings of the names of a prediction's band beside its signal: both ends of 95 %, and the
+#: standard deviations of its parts.
+BAND_ENDINGS = ("low95", "high95", "sd_parameters", "sd_noise", "sd_law")
+
+_BAND_NAMES = {
+    "low95": "lower end of the 95 % band",
+    "high95": "upper end of the 95 % band",
+    "sd_parameters": "standard deviation, part of the parameters",
+    "sd_noise": "standard deviation, part of the noise",
+    "sd_law": "standard deviation, part of the law",
+}
+
 #: Units of the physical values under /entry/data.
 UNITS = MappingProxyType(
     {
@@ -111,6 +124,8 @@ UNITS = MappingProxyType(
         "displacement_model": "m",
         "stretch": "1",
         "nominal_stress": "Pa",
+        **{f"displacement_{end}": "m" for end in BAND_ENDINGS},
+        **{f"nominal_stress_{end}": "Pa" for end in BAND_ENDINGS},
     }
 )
 
@@ -122,6 +137,11 @@ LONG_NAMES = MappingProxyType(
         "current_monitor": "current, monitored",
         "displacement_model": "displacement, live model",
         "nominal_stress": "nominal stress",
+        **{
+            f"{signal}_{end}": f"{signal.replace('_', ' ')}, {name}"
+            for signal in SIGNALS.values()
+            for end, name in _BAND_NAMES.items()
+        },
     }
 )
 

@@ -67,6 +67,9 @@ def before_after_figure(before: Comparison, after: Comparison) -> Figure:
             (first, before, BEFORE, "before"), (last, after, AFTER, "after"),
         ):  # fmt: skip
             error = (comparison.measured - comparison.model) * shown.error_factor
+            if comparison.band is not None:
+                half = comparison.band.half_width * shown.error_factor
+                base.shade(ax, time, -half, half)
             _band(ax, comparison.noise, shown)
             ax.plot(*decimate(time, error, base.COLUMNS), color=colour, linewidth=0.8)
             rms = significant(comparison.errors.rms * shown.error_factor)

@@ -26,6 +26,7 @@ from dearig.report.figures.style import (
     few_ticks,
     legend,
     log_axis,
+    shade,
 )
 from dearig.report.text.numbers import significant
 from dearig.units import SHOWN, Shown
@@ -111,6 +112,11 @@ def _stack(axes: list[Axes], comparison: Comparison) -> None:
     both.plot(*curve(comparison.measured * shown.factor), label="measured", **_measured_look())
     both.plot(*curve(comparison.model * shown.factor), label="model", **_model_look())
     both.set_ylabel(shown.label)
+    if comparison.band is not None:
+        half, model = comparison.band.half_width, comparison.model
+        shade(both, time, (model - half) * shown.factor, (model + half) * shown.factor)
+        half = half * shown.error_factor
+        shade(error, time, -half, half, "95 % band")
     legend(both)
     _noise_band(error, comparison, shown)
     error.plot(
@@ -155,6 +161,7 @@ def _noise_band(ax: Axes, comparison: Comparison, shown: Shown) -> None:
                 label=None if i else
                 f"\N{PLUS-MINUS SIGN} noise floor, {significant(floor)} {shown.error_unit}",
             )  # fmt: skip
+    if comparison.noise is not None or comparison.band is not None:
         legend(ax)
     ax.axhline(0.0, color=UNSURE, linewidth=0.6, zorder=0.6)
 

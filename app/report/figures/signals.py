@@ -17,11 +17,14 @@ from dearig.report.figures.style import (
     blank,
     few_ticks,
     legend,
+    shade,
 )
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from dearig.analysis.readings.band import PredictionBand
 
 __all__ = ["signal_figure", "voltage_figure"]
 
@@ -47,16 +50,20 @@ def signal_figure(
     drive: np.ndarray | None,
     measured: np.ndarray | None = None,
     model: np.ndarray | None = None,
+    band: PredictionBand | None = None,
 ) -> Figure:
     """Return a figure of the drive, and of what was measured or predicted or both, over time.
 
     ``kind`` is actuator (V, m) or film (stretch, Pa); the arrays are (N,) in SI units on ``time``
-    in s, and a curve that is None is left out.
+    in s, and a curve that is None is left out. ``band`` is that of the prediction; it has axes of
+    its own below, since it is narrower than a line is thick.
     """
     shown = SHOWN[kind]
     with style():
-        figure = blank(1.2 * WIDTH, 3.6)
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.7))
+        figure = blank(1.2 * WIDTH, 3.6 if band is None else 4.8)
+        heights = (1.0, 1.7) if band is None else (1.0, 1.7, 1.0)
+        axes = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
+        upper, lower = axes[:2]
         if drive is not None:
             curve = decimate(time, drive * shown.drive_factor, COLUMNS)
             upper.plot(*curve, color=DRIVE, linewidth=1.2)
@@ -70,11 +77,18 @@ def signal_figure(
                 curve = decimate(time, values * shown.factor, COLUMNS)
                 lower.plot(*curve, color=colour, linewidth=1.3, label=name, dashes=dashes)
         lower.set_ylabel(shown.label.replace(" (", "\n("))
-        lower.set_xlabel("Time (s)")
+        if band is not None and model is not None:
+            half = band.half_width
+            shade(lower, time, (model - half) * shown.factor, (model + half) * shown.factor)
+            half = half * shown.error_factor
+            shade(axes[2], time, -half, half)
+            axes[2].axhline(0.0, color=MODEL, linewidth=0.8)
+            axes[2].set_ylabel(f"95 % band\n({shown.error_unit})")
+        axes[-1].set_xlabel("Time (s)")
         lower.set_xlim(time[0], time[-1])
         if both:
             legend(lower)
-        for ax in (upper, lower):
+        for ax in axes:
             few_ticks(ax, y=5)
-        figure.align_ylabels([upper, lower])
+        figure.align_ylabels(axes)
     return figure

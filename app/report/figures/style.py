@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "BAND",
     "COLUMNS",
     "DRIVE",
     "ERROR",
@@ -30,10 +31,12 @@ __all__ = [
     "blank",
     "decimated_log",
     "drawable",
+    "envelope",
     "few_ticks",
     "legend",
     "log_axis",
     "log_ticks",
+    "shade",
 ]
 
 
@@ -44,6 +47,7 @@ ERROR = "#667085"
 MARK = "#1A1A1A"
 DRIVE = "#4D4D4D"
 NOISE = "#C9CED6"
+BAND = "#F6D9C3"  # of a prediction: the colour of the model, pale
 THESIS = "#009E73"
 UNSURE = "#8A8A8A"
 
@@ -112,6 +116,25 @@ def decimated_log(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     """Decimate a curve for a logarithmic axis of ``x`` (N,) > 0."""
     log_x, kept = decimate(np.log(x), y, COLUMNS // 2)
     return np.exp(log_x), kept
+
+
+def envelope(
+    x: np.ndarray, low: np.ndarray, high: np.ndarray, columns: int = COLUMNS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a band from ``low`` to ``high`` (N,) over ``x`` in at most ``columns`` columns.
+
+    Each has the lowest and the highest end of its samples. NaN is no sample.
+    """
+    starts = np.unique(np.linspace(0, x.size, columns, endpoint=False).astype(int))
+    return x[starts], np.fmin.reduceat(low, starts), np.fmax.reduceat(high, starts)
+
+
+def shade(ax: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, label: str = "") -> None:
+    """Shade the 95 % band from ``low`` to ``high`` (N,) of a prediction behind the curves."""
+    ax.fill_between(
+        *envelope(x, low, high), step="post", color=BAND, linewidth=0, zorder=0.4,
+        label=label or None,
+    )  # fmt: skip
 
 
 def drawable(text: str, longest: int) -> str:

@@ -9,6 +9,7 @@ from dearig.config.modelfile import ModelFile
 from dearig.model.effects import EFFECTS
 from dearig.model.film.material import Spring
 from dearig.model.simulation.actuator import Actuator
+from dearig.report.text.laws import place_text
 from dearig.report.text.numbers import significant
 
 __all__ = ["prony_text"]
@@ -96,7 +97,7 @@ def _lines(given: ModelFile, version: str) -> Iterator[str]:
         )
     for name in left_out:
         effect = EFFECTS[name]
-        yield f"- Not expressed: {name} (acts on the {effect.acts_on}): {_WHERE[effect.acts_on]}."
+        yield f"- Not expressed: {name} (acts {place_text(effect.acts_on)}): {_WHERE[effect.acts_on]}."
     yield from _programs(network.equilibrium, instant, long_term, terms)
 
 

@@ -20,6 +20,7 @@ from dearig.batch.queue import (
     CampaignOutcome,
     Queue,
 )
+from dearig.recording.content.fields import CONDITIONS
 from dearig.recording.reading.origin import origins_of_files
 from dearig.report.pages.head import head_of
 from dearig.report.pages.html import picture, prefixes, write_page
@@ -44,10 +45,13 @@ __all__ = [
 ]
 
 #: Numbers of a run in the table, at most; all are in the JSON.
-_NUMBERS = 4
+_NUMBERS = 6
 #: Numbers that the page draws, at most.
 _DRAWN = 8
-_SHOWN_FIRST = ("mu_0_kPa", "fit_rms_um", "validation_rms_um", "diagnosis_rms_um")
+_SHOWN_FIRST = (
+    "mu_0_kPa", "fit_rms_um", "validation_rms_um", "diagnosis_rms_um",
+    "peak_displacement_mm", *CONDITIONS,
+)  # fmt: skip
 
 
 def campaign_json(outcome: CampaignOutcome) -> dict[str, Any]:

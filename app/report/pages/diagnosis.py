@@ -15,7 +15,14 @@ from dearig.report.figures.channels import channel_figure, evidence_figure
 from dearig.report.figures.recordings import comparison_figure
 from dearig.report.figures.residual import residual_panels
 from dearig.report.pages.head import head_of, origins_of
-from dearig.report.pages.html import Picture, fitted_rows, picture, prefixes, write_page
+from dearig.report.pages.html import (
+    Picture,
+    band_caption,
+    fitted_rows,
+    picture,
+    prefixes,
+    write_page,
+)
 from dearig.report.pages.laws import LawView, law_view
 from dearig.report.text.channels import channel_table, channel_title
 from dearig.report.text.diagnosis import (
@@ -33,6 +40,7 @@ from dearig.report.text.diagnosis import (
     warnings,
 )
 from dearig.report.text.estimates import effect_table, estimate_table
+from dearig.report.text.laws import place_text
 from dearig.report.text.numbers import seconds, significant
 from dearig.report.text.sentences import describe_model
 from dearig.report.text.tables import Table
@@ -239,7 +247,7 @@ def _unnamed(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     unnamed = outcome.finding.unnamed
     if unnamed is None:
         return ()
-    said = [f"It acts on the {unnamed.acts_on}."]
+    said = [f"It acts {place_text(unnamed.acts_on)}."]
     if unnamed.signature:
         said.append(_with_full_stop(_capitalised(unnamed.signature)))
     if unnamed.expression:
@@ -333,7 +341,8 @@ def _validation_pictures(
         label = f"{after.name} ({after.row})" if after.row else after.name
         last = f"{significant(after.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
         if not changed:
-            found.append(picture(comparison_figure(after), names, f"{label}: {last}."))
+            caption = f"{label}: {last}.{band_caption(after)}"
+            found.append(picture(comparison_figure(after), names, caption))
             continue
         first = f"{significant(before.errors.rms * shown.error_factor)}"
         found.append(
@@ -342,7 +351,7 @@ def _validation_pictures(
                 names,
                 f"{label}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by both "
                 f"models, and the error before ({first}) and after ({last}); the "
-                f"error axes have different scales.",
+                f"error axes have different scales.{band_caption(before)}{band_caption(after)}",
             )
         )
     return tuple(found)

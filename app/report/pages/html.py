@@ -31,6 +31,7 @@ from dearig.report.pages.head import head_of, origins_of
 from dearig.report.pages.pdf import check_browser, is_pdf, write_pdf
 from dearig.report.pages.seal import POLICY, sealed
 from dearig.report.stored import Outcome, stored, stored_url
+from dearig.report.text.bands import band_texts
 from dearig.report.text.channels import channel_errors, channel_title
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
 from dearig.report.text.sentences import (
@@ -439,6 +440,14 @@ def picture(
     return Picture(figure, next(prefixes), caption, data)
 
 
+def band_caption(comparison: Comparison) -> str:
+    """Return sentences on the band of a figure of ``comparison``, "" where it has none."""
+    if comparison.band is None:
+        return ""
+    error = comparison.measured - comparison.model
+    return " Shaded: " + " ".join(band_texts(comparison.band, comparison.kind, error))
+
+
 def _comparison_pictures(
     comparisons: Sequence[Comparison], prefixes: Iterator[str]
 ) -> tuple[Picture, ...]:
@@ -452,7 +461,7 @@ def _comparison_pictures(
                 comparison_figure(c),
                 prefixes,
                 f"{name}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by the "
-                f"model, and measured minus model ({error}).",
+                f"model, and measured minus model ({error}).{band_caption(c)}",
             )
         )
         if c.kind == "film":

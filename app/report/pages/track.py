@@ -26,9 +26,11 @@ from dearig.report.figures.style import (
     few_ticks,
     legend,
     log_axis,
+    shade,
 )
 from dearig.report.pages.head import head_of
 from dearig.report.pages.html import Picture, picture, prefixes, write_page
+from dearig.report.text.bands import band_json, band_texts
 from dearig.report.text.numbers import NO_VALUE, significant
 from dearig.report.text.tables import Row, Table
 from dearig.units import readable
@@ -102,6 +104,8 @@ def track_summary(outcome: TrackOutcome) -> tuple[str, ...]:
         said.append(f"The film can follow the whole target within {_um(outcome.within)} um.")
     if outcome.status != "complete":
         said.append(f"Not all runs were made ({outcome.status}): {outcome.reason}.")
+    elif outcome.reason:
+        said.append(f"Not all runs were needed: {outcome.reason}.")
     return tuple(readable(sentence) for sentence in said)
 
 
@@ -199,6 +203,9 @@ def runs_figure(outcome: TrackOutcome) -> Figure:
         error.set_ylabel("Error (\N{MICRO SIGN}m)")
         error.set_xlabel("Time (s)")
         error.set_xlim(found.time[0], found.time[-1])
+        if outcome.band is not None:
+            half = outcome.band.half_width * _UM
+            shade(error, found.time[: half.size], -half, half)
         if math.isfinite(outcome.noise):
             error.axhspan(-outcome.noise * _UM, outcome.noise * _UM, color=NOISE, linewidth=0)
         legend(both, 2)
@@ -283,6 +290,7 @@ def track_json(outcome: TrackOutcome) -> dict[str, Any]:
             }
             for run in outcome.runs
         ],
+        "band": band_json(outcome.band, "actuator"),
         "status": outcome.status,
         "reason": outcome.reason,
         "warnings": list(outcome.warnings),
@@ -302,7 +310,7 @@ def _contents(outcome: TrackOutcome) -> Callable[[], dict[str, Any]]:
                     runs_figure(outcome), numbers,
                     "Voltage, target and measured displacement, and target minus measured where "
                     "the film can follow. The grey band is the noise of a reading; where the "
-                    "target is shaded, the film cannot follow it.",
+                    f"target is shaded, the film cannot follow it.{_band_caption(outcome)}",
                 ),
                 picture(errors_figure(outcome), numbers, "Error of every run."),
             ]  # fmt: skip
@@ -324,6 +332,13 @@ def _contents(outcome: TrackOutcome) -> Callable[[], dict[str, Any]]:
         }
 
     return contents
+
+
+def _band_caption(outcome: TrackOutcome) -> str:
+    if outcome.band is None:
+        return ""
+    said = " ".join(band_texts(outcome.band, "actuator"))
+    return f" The coloured band is that of what the model predicts of its own first run. {said}"
 
 
 def _shown(outcome: TrackOutcome) -> list[TrackedRun]:

@@ -12,6 +12,7 @@ import numpy as np
 from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
 from dearig.model.verdict import NOT_CONFIRMED, TOLERANCE
 from dearig.report.text.excitation import tested_texts, undetermined_texts
+from dearig.report.text.laws import place_text
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
 from dearig.report.text.sentences import few_data_text, listed, undetermined_names_text
 from dearig.report.text.tables import Row, Table
@@ -164,7 +165,7 @@ def family_label(family: str) -> str:
 def step_label(step: Step) -> str:
     """Return a step's effect with its family and the quantity that it acts on."""
     family = "" if family_label(step.family) == step.effect else f"{family_label(step.family)}, "
-    return f"{step.effect} ({family}acting on the {step.acts_on})"
+    return f"{step.effect} ({family}acting {place_text(step.acts_on)})"
 
 
 def _with_rivals(step: Step) -> str:
@@ -398,7 +399,9 @@ def _unnamed(outcome: DiagnoseOutcome) -> str:
     if unnamed is None:
         return ""
     formula = f"; as a formula: {unnamed.expression}" if unnamed.expression else ""
-    return _sentence(f"The part that no known family covers acts on the {unnamed.acts_on}{formula}")
+    return _sentence(
+        f"The part that no known family covers acts {place_text(unnamed.acts_on)}{formula}"
+    )
 
 
 def _sentence(text: str) -> str:

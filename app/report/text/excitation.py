@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dearig.analysis.outcomes import DiagnoseOutcome
     from dearig.model.diagnosis.excitation import Band
 
-__all__ = ["tested_texts", "undetermined_texts"]
+__all__ = ["bands_text", "tested_texts", "undetermined_texts"]
 
 
 def undetermined_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
@@ -25,7 +25,7 @@ def undetermined_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
         if asked.cause == BANDS:
             yield (
                 f"{asked.name} asks for motion that the training recordings do not determine, "
-                f"{_bands_text(bands)}: {significant(100.0 * asked.share, 2)} % of its error above "
+                f"{bands_text(bands)}: {significant(100.0 * asked.share, 2)} % of its error above "
                 f"the noise lies there."
             )
         elif asked.cause == LEVELS:
@@ -46,7 +46,7 @@ def undetermined_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
         )
 
 
-def _bands_text(bands: Sequence[Band]) -> str:
+def bands_text(bands: Sequence[Band]) -> str:
     """Return ``bands`` of rising frequency as "at 0.1 to 0.4 Hz and 50 to 100 Hz"."""
     joined: list[list[float]] = []
     for band in bands:

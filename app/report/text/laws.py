@@ -23,7 +23,13 @@ __all__ = [
     "law_lines",
     "other_symbols",
     "parameter_meanings",
+    "place_text",
 ]
+
+
+def place_text(acts_on: str) -> str:
+    """Return where an effect acts as "on the film stress" or "through the environment"."""
+    return f"{'through' if acts_on == 'environment' else 'on'} the {acts_on}"
 
 
 def effect_named(name: str) -> Effect:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         SpringCandidate,
         ValidateOutcome,
     )
+    from dearig.analysis.simulate import SimulatedRecord
     from dearig.model.fitting import Identification
     from dearig.model.simulation.actuator import Actuator
     from dearig.model.simulation.strip import Strip
@@ -28,6 +29,7 @@ __all__ = [
     "few_data_text",
     "identify_summary",
     "listed",
+    "pull_in_text",
     "spring_label",
     "undetermined_names_text",
     "undetermined_text",
@@ -51,6 +53,15 @@ def spring_label(kind: str) -> str:
     from dearig.model.springs import SPRING_LAWS
 
     return SPRING_LAWS[kind].shown
+
+
+def pull_in_text(prediction: SimulatedRecord) -> str:
+    """Return the voltage of the static pull-in of a prediction, or why there is none."""
+    if prediction.pull_in is not None:
+        return f"{significant(prediction.pull_in * 1e-3)} kV"
+    if prediction.open_limits:
+        return f"not known: the data do not determine {listed(map(symbol, prediction.open_limits))}"
+    return "none: the springs stiffen first"
 
 
 def listed(names: Iterable[str]) -> str:

@@ -70,6 +70,10 @@ MEASUREMENTS = {
             "tests.benchmarks.bench_slow_noise",
         ),
     ),
+    "bands": Measurement(
+        "How often the 95 % bands of predictions hold unseen recordings",
+        (f"tests.benchmarks.bench_bands --folder {SCRATCH}",),
+    ),
     "rig": Measurement(
         "Speed of the simulated rig, and long runs on the simulated card",
         (

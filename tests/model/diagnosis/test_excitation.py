@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from dearig.config.sequencefile import load_sequence
-from dearig.model.diagnosis.excitation import BANDS, LEVELS, Motion, excitation, range_of
+from dearig.model.diagnosis.excitation import (
+    BANDS,
+    LEVELS,
+    Motion,
+    excitation,
+    range_of,
+    shown_by,
+)
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.verdict import TOLERANCE
@@ -142,3 +149,26 @@ def test_how_far_recordings_test_a_model() -> None:
     # 5.5 kV in 0.15 s
     assert edges.rate == pytest.approx(5500.0 / 0.15, rel=1e-3)
     assert lobes.rate < edges.rate
+
+
+def test_what_goes_beyond_training_is_known_without_an_error() -> None:
+    shown = shown_by([motion("thesis")])
+    assert shown.beyond(motion("validation-b-7.0")) is None
+    edges = shown.beyond(motion(EDGES))
+    assert edges is not None
+    found = excitation([motion("thesis")], motion(EDGES), error(EDGES, DAMPED))
+    assert [b.low for b in edges.bands] == pytest.approx([b.low for b in found.undetermined])
+    louder = shown.beyond(motion("thesis", scale=1.2))
+    assert louder is not None
+    assert louder.levels
+
+
+def test_what_is_sampled_faster_than_training_is_beyond_it() -> None:
+    shown = shown_by([motion("thesis")])
+    fast = motion("thesis")
+    time = np.arange(4 * fast.response.size) * STEP / 4.0
+    tone = 30.0 * NOISE * np.sin(2.0 * np.pi * 150.0 * time)
+    twice = Motion("fast", STEP / 4.0, np.repeat(fast.drive, 4), tone, NOISE)
+    beyond = shown.beyond(twice)
+    assert beyond is not None
+    assert beyond.bands[-1].high == pytest.approx(2.0 / STEP)

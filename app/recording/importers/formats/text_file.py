@@ -30,7 +30,12 @@ from dearig.recording.importers.formats.cells import (
     with_order,
 )
 from dearig.recording.importers.formats.columns import ColumnOverview, NamedColumns
-from dearig.recording.importers.formats.text_blocks import BytesReader, blocks_of, halves_of
+from dearig.recording.importers.formats.text_blocks import (
+    BytesReader,
+    blocks_of,
+    halves_of,
+    line_feeds,
+)
 from dearig.recording.importers.formats.text_layout import (
     HEAD_CHARACTERS,
     TextColumn,
@@ -41,6 +46,7 @@ from dearig.recording.importers.formats.text_layout import (
     layout_of,
 )
 from dearig.recording.importers.formats.text_sections import TextSection, sections_of
+from dearig.recording.importers.formats.text_table import Table
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.moments import first_moment
 from dearig.recording.importers.quantities.text_numbers import GROUPED, signs_of
@@ -50,10 +56,10 @@ __all__ = ["IMPORTER", "TextFile"]
 
 #: Bytes of a block that is read line by line where it is not whole.
 SHORT = 2**15
+#: Bytes of a file whose numbers are parsed by compiled code: pandas takes a tenth of a second.
+LONG = 2**24
 #: Threads that parse blocks.
 THREADS = 2
-#: Room for rows, in multiples of those that the first block lets expect.
-ROOM = 1.05
 #: Bytes of an ASCII character in encodings where it has several.
 _WIDTHS = MappingProxyType({"utf-16": 2, "utf-32": 4})
 #: The first lines of a universal file: a separator, and the number of a kind of data.
@@ -210,7 +216,7 @@ class TextFile(NamedColumns[TextColumn]):
                 break
         return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
 
-    def _read_rows(self, wanted: list[TextColumn], skip: bool, counts: bool = False) -> _Table:
+    def _read_rows(self, wanted: list[TextColumn], skip: bool, counts: bool = False) -> Table:
         """Return the rows of the columns ``wanted``; leave wrong ones out if ``skip``.
 
         With ``counts`` it is only asked how many are wrong: raises ``_HopelessError`` once most
@@ -218,13 +224,38 @@ class TextFile(NamedColumns[TextColumn]):
         """
         self.skipped, self._spans, self._wanted, self._pointed = [], [], wanted, set()
         self._leaves_out, self._counts = skip, counts
-        table = _Table(len(wanted))
+        table = Table(len(wanted))
         size = left = self._size
-        for line, block, values in self._parsed():
+        is_long = size >= LONG and self._is_plain and bool(wanted)
+        for line, block, values in self._compiled(table) if is_long else self._parsed():
             self._keep(line, block, values, table, left)
             left -= len(block)
             self.progress(1.0 - max(left, 0) / size)
         return table
+
+    def _compiled(self, table: Table) -> Iterator[tuple[int, bytes, list[np.ndarray] | None]]:
+        """Yield blocks as ``_parsed`` does, parsed by compiled code where they are plain numbers.
+
+        The code is loaded, or compiled, in seconds: only a long file is worth them.
+        """
+        from dearig.recording.importers.formats.number_block import numbers_of
+
+        layout, wanted = self.layout, self._wanted
+        undecided = {c.place for c in wanted if c.undecided and c.name not in self._decided}
+        places = [c.place for c in wanted]
+        left = self._size
+        for line, block in self._blocks():
+            room = table.room(len(wanted), line_feeds(block) + 1, left / len(block))
+            found = numbers_of(
+                block, layout.delimiter, wanted[0].decimal, places, layout.cells, room
+            )
+            left -= len(block)
+            if found is None:
+                yield line, block, self._read_fast(block)
+                continue
+            rows, pointed = found
+            self._pointed |= {p for p, has in zip(places, pointed, strict=True) if has} & undecided
+            yield line, block, list(room[:, :rows])
 
     def _decide(self, name: str) -> bool:
         """Find the signs in the numbers of a column from all its cells; return if they changed.
@@ -357,7 +388,7 @@ class TextFile(NamedColumns[TextColumn]):
                 yield first, whole, found.result()
 
     def _keep(
-        self, line: int, block: bytes, values: list[np.ndarray] | None, table: _Table, left: int
+        self, line: int, block: bytes, values: list[np.ndarray] | None, table: Table, left: int
     ) -> None:
         """Append the rows of ``block`` to ``table``; of ``left`` bytes of the file, it is a part.
 
@@ -518,32 +549,6 @@ class _Span:
     before: int
     line: int
     end: int
-
-
-class _Table:
-    """Columns that grow by blocks of rows; ``rows`` of them are there."""
-
-    def __init__(self, width: int) -> None:
-        self._room = np.empty((width, 0))
-        self.rows = 0
-
-    @property
-    def values(self) -> np.ndarray:
-        """The rows that are there, (columns, rows)."""
-        return self._room[:, : self.rows]
-
-    def append(self, columns: Sequence[np.ndarray], more: float) -> None:
-        """Append rows; ``more`` times as many are expected, with these."""
-        count = columns[0].size if columns else 0
-        end = self.rows + count
-        if end > self._room.shape[1]:
-            # room that is never written takes no memory
-            grown = np.empty((len(columns), self.rows + int(count * max(more, 1.0) * ROOM) + 1))
-            grown[:, : self.rows] = self.values
-            self._room = grown
-        for room, values in zip(self._room, columns, strict=True):
-            room[self.rows : end] = values
-        self.rows = end
 
 
 def _sniff(head: bytes) -> bool:

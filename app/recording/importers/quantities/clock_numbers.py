@@ -8,6 +8,7 @@ __all__ = ["by_sixties", "counts_days", "epoch_unit"]
 
 #: Spread of the steps counted by sixties, over that of the numbers: chance gives no such part.
 _EVENER = 0.25
+_SOME = 1000  # numbers that are looked at first
 _ROWS_MIN = 10  # with fewer rows, what looks like minutes and seconds may be chance
 #: Seconds since 1970 of the years 2001 to 2100, and the units in which programs count them.
 _EPOCH = (1e9, 4.1e9)
@@ -20,17 +21,28 @@ def by_sixties(values: np.ndarray) -> np.ndarray | None:
     They are counted by sixties where no number has more than .59 behind the point, 41.00 follows
     40.59, and the steps are far more even so.
     """
-    hundredths = np.round(100.0 * values)
-    if values.size < _ROWS_MIN or not np.isfinite(values).all() or (values < 0.0).any():
+    if values.size < _ROWS_MIN:
         return None
-    if np.max(np.abs(100.0 * values - hundredths)) > 1e-6 * max(float(hundredths.max()), 1.0):
+    # most times are plain by their first numbers already
+    if _by_sixties(values[:_SOME]) is None or (found := _by_sixties(values)) is None:
         return None
-    whole, rest = np.divmod(hundredths, 100.0)
-    if rest.max() > 59.0 or not (np.diff(rest) < 0.0).any():
+    hundredths, whole, rest = found
+    if not (np.diff(rest) < 0.0).any():
         return None
     counted = 60.0 * whole + rest
     plain = float(np.std(np.diff(hundredths)))
     return counted if float(np.std(np.diff(counted))) < _EVENER * plain else None
+
+
+def _by_sixties(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Return hundredths, whole numbers and rests up to 59 of ``values`` (n,); None for others."""
+    hundredths = np.round(100.0 * values)
+    if not np.isfinite(values).all() or (values < 0.0).any():
+        return None
+    if np.max(np.abs(100.0 * values - hundredths)) > 1e-6 * max(float(hundredths.max()), 1.0):
+        return None
+    whole, rest = np.divmod(hundredths, 100.0)
+    return None if rest.max() > 59.0 else (hundredths, whole, rest)
 
 
 def epoch_unit(values: np.ndarray) -> str:
