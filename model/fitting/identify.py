@@ -62,11 +62,11 @@ METHODS = ("hybrid", "de")
 
 # Hz: resolves relaxation times of tens of milliseconds; thinning raises it where means would not do
 _COARSE_RATE = 50.0
+_LEADERS = 2  # starts that are followed to their ends
 _POPULATIONS = 20.0  # simulated until a descent counts as half done
 _COARSE_SAMPLES = 1500  # of a film record
 _MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
-_LEADERS = 2  # starts that are followed to their ends
 _GAIN_LEFT = 0.1  # of the gain that counts: where a fit ends that is reported
 _RESOLVED = 0.2  # of a mean's interval: the shortest relaxation time of a search on means
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
