@@ -47,6 +47,8 @@ __all__ = [
 
 _KEY = object()
 _BYTES = 8  # of one sample, a float64
+#: Relative: a rate of 100 kHz may become the next one that a card divides from 20 MHz.
+_RATE_TOLERANCE = 5e-3
 _ROUNDING = 1e-9  # of a change: that of a difference of two corrections
 # Samples that are computed, checked and hashed together: 0.5 MB, which stays in a processor's cache
 _PIECE = 2**16
@@ -215,6 +217,18 @@ class GatedWaveform:
                 f"the waveform passed the gate under wider limits ({self._limits}) than this "
                 f"rig's ({limits}); admit it under this rig's limits"
             )
+
+    def check_rate(self, actual: float) -> None:
+        """Raise ``RefusedWaveform`` where a rig plays at another rate in Hz than was judged.
+
+        Slew, energy and time at voltage were judged at ``rate``.
+        """
+        if not abs(actual - self.rate) <= _RATE_TOLERANCE * self.rate:
+            reason = (
+                f"the rig's sample clock would run at {actual:g} Hz in place of {self.rate:g} Hz, "
+                f"for which the limits were judged: set card.sample_rate_Hz to a rate that it has"
+            )
+            raise RefusedWaveform((reason,))
 
     @property
     def duration(self) -> float:

@@ -166,6 +166,7 @@ def record(
             try:
                 # conversions go to interlocks and feedback, rows to recording and observers
                 conversion_rate = rig.load(waveform)
+                waveform.check_rate(conversion_rate)  # for drivers that do not
                 identity = rig.identify()
                 channels = identity.channels
                 rows = RowMeans(rig_file.card.average)

@@ -144,7 +144,7 @@ class DaqmxRig:
         """Load a waveform that has passed the gate; returns the actual sample rate in Hz.
 
         Raises ``RigError`` for a waveform that passed under wider limits than this rig's, or that
-        the card cannot play.
+        the card cannot play, and ``RefusedWaveform`` where the card has only another rate.
         """
         if not isinstance(waveform, GatedWaveform):
             raise TypeError(
@@ -161,6 +161,7 @@ class DaqmxRig:
             try:
                 command = Command(waveform, self._card.channels[0].scaling)
                 rate = tasks.prepare(command, waveform.rate)
+                waveform.check_rate(rate)
             except BaseException:
                 tasks.close()
                 raise

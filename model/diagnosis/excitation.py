@@ -194,7 +194,10 @@ class Shown:
         return np.asarray(further | (asked.response > self.high + asked.noise))
 
     def beyond(self, asked: Motion) -> Beyond | None:
-        """Return where ``asked`` goes beyond training; None where it does not."""
+        """Return where ``asked`` goes beyond training; None where it does not.
+
+        As a voltage may be, a displacement may be higher by a part that is not counted.
+        """
         edges, shown = self.edges, self.energies
         if 0.5 / asked.step > edges[-1]:
             # faster than any training recording was sampled
@@ -205,7 +208,9 @@ class Shown:
             Band(float(low), float(high), math.sqrt(a), float(k), 0.0)
             for low, high, a, k in zip(edges[:-1], edges[1:], asks, known, strict=True)
         )
-        found = Beyond(bool(self.further(asked).any()), _undetermined(bands))
+        more = (_LEVEL_RATIO - 1.0) * (self.high - self.low)
+        nearly = replace(self, low=self.low - more, high=self.high + more)
+        found = Beyond(bool(nearly.further(asked).any()), _undetermined(bands))
         return found if found.levels or found.bands else None
 
 

@@ -28,6 +28,7 @@ from dearig.model.fitting.intervals import (
     correlation_time,
     covariance,
     firm_directions,
+    linear_ends,
     linear_widths,
 )
 from dearig.model.fitting.levenberg import LocalFit, descend, gain_that_counts
@@ -67,7 +68,8 @@ _POPULATIONS = 20.0  # simulated until a descent counts as half done
 _COARSE_SAMPLES = 1500  # of a film record
 _MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
-_GAIN_LEFT = 0.1  # of the gain that counts: where a fit ends that is reported
+_GAIN_LEFT = 0.1  # of the gain that counts: for it a fit that has converged goes on
+_LAST_STEPS = 3  # at most: in a flat valley each gains a little
 _RESOLVED = 0.2  # of a mean's interval: the shortest relaxation time of a search on means
 _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distance to the optimum
 # Of an interval's width, which means and quicker steps may change: it changes a coverage of 95 %
@@ -75,12 +77,15 @@ _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distanc
 _WIDTH_ERROR_MAX = 0.01
 # Of a prior's variance, by which the data must narrow it to say anything of it
 _PRIOR_TOLD = 1e-6
+# Of the rise of chi-square at the ends of linear intervals, which they may change
+_RISE_ERROR_MAX = 0.05
 # Hz and fidelity of the means for the intervals, the cheapest first
 _LEVELS = (
     (0.5 * _COARSE_RATE, kernel.COARSE),
     (_COARSE_RATE, kernel.COARSE),
     (_COARSE_RATE, kernel.QUICK),
     (_COARSE_RATE, kernel.CAREFUL),
+    (4.0 * _COARSE_RATE, kernel.QUICK),
 )
 
 
@@ -457,7 +462,10 @@ def fit_globally(
                 first = layout.fixed
                 x = _descend_on_means(problem, coarse, freed.x, first)
     descents.ended()
-    fit = descend(problem, x, first, gain=_little_gain(problem, x), damping=1e-4)
+    fit = descend(problem, x, first, damping=1e-4)
+    enough = _GAIN_LEFT * gain_that_counts(fit.cost * problem.samples, problem.samples)
+    last = descend(problem, fit.x, first, _LAST_STEPS, enough, 1e-4, known=fit.residuals)
+    fit = replace(last, converged=fit.converged or last.converged)
     problem.on_simulations = counted
     progress("descents", 1.0)
     problem.simulations += coarse.simulations
@@ -494,7 +502,7 @@ def _descend_on_means(
     x, cost = start, float(problem.costs(start[None])[0])
     for _ in range(_CORRECTIONS_MAX):
         recentre(means, problem, problem.layout.values(x))
-        moved = descend(means, x, held, gain=_little_gain(problem, x), damping=1e-4).x
+        moved = descend(means, x, held, damping=1e-4).x
         reached = float(problem.costs(moved[None])[0])
         gained = (cost - reached) * problem.samples
         if gained > 0.0:
@@ -502,12 +510,6 @@ def _descend_on_means(
         if gained < gain_that_counts(cost * problem.samples, problem.samples):
             break
     return x
-
-
-def _little_gain(problem: Problem, x: np.ndarray) -> float:
-    """Return the gain in chi-square of ``problem`` near ``x`` (d,) that ends the last descents."""
-    chi2 = float(problem.costs(x[None])[0]) * problem.samples
-    return _GAIN_LEFT * gain_that_counts(chi2, problem.samples)
 
 
 def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: int) -> bool:
@@ -559,18 +561,24 @@ def _levels_of(
     some hundred times. The means of smooth readings determine them as well as all readings do, and
     so do quick steps. But where two branches hardly differ, the difference of their derivatives is
     as small as the error of the quickest steps: what they determine together is refitted in
-    quick ones.
+    quick ones. And a relaxation time may be resolved by means where the fit is, but not where its
+    interval ends: chi-square has to rise as much there as that of all readings does.
     """
     layout = problem.layout
     x, free = layout.coordinates(values), ~held
     exact = problem.jacobian(x, free)
     directions, bent = firm_directions(exact, values, layout, free)
+    ends = linear_ends(layout, x, free, exact)
+    rises = _rises(problem, x, ends)
+    allowed = _RISE_ERROR_MAX * np.maximum(rises, CHI2_95)
     for rate, fidelity in _LEVELS:
         means = coarse_problem(problem, corrected=True, rate=rate)
         means.fidelity = fidelity
         widths = linear_widths(exact, means.jacobian(x, free), directions)
         if np.max(np.abs(widths - 1.0), initial=0.0) < _WIDTH_ERROR_MAX:
-            break
+            recentre(means, problem, values)
+            if np.all(np.abs(_rises(means, x, ends) - rises) < allowed):
+                break
     else:
         means = problem
     found = [(means, ~bent)]
@@ -583,3 +591,9 @@ def _levels_of(
         if each is not problem:
             recentre(each, problem, values)
     return found
+
+
+def _rises(problem: Problem, x: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Return by how much chi-square is larger at ``ends`` (P, d) than at ``x`` (d,)."""
+    costs = problem.costs(np.vstack([x, ends]))
+    return np.asarray((costs[1:] - costs[0]) * problem.samples)

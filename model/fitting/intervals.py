@@ -23,6 +23,7 @@ __all__ = [
     "has_spectrum_of",
     "is_determined",
     "is_flat",
+    "linear_ends",
     "linear_widths",
     "natural_ends",
     "profile",
@@ -213,6 +214,24 @@ def linear_widths(exact: np.ndarray, other: np.ndarray, directions: np.ndarray) 
         variances.append(np.einsum("ij,jk,ik->i", directions, inverse, directions))
     seen = variances[0] > 0.0
     return np.asarray(np.sqrt(variances[1][seen] / variances[0][seen]))
+
+
+def linear_ends(
+    layout: FitLayout, x: np.ndarray, free: np.ndarray, jacobian: np.ndarray
+) -> np.ndarray:
+    """Return both ends (2 f, d) of each parameter's linear interval about ``x`` (d,).
+
+    With the others where the ``jacobian`` (N, f) says that they are refitted to.
+    """
+    if not free.any():
+        return np.empty((0, x.size))
+    spread = covariance(jacobian.T @ jacobian, CHI2_95)
+    reach = layout.reach(x)[free]
+    away = spread / np.sqrt(np.diag(spread))[:, None]
+    away /= np.maximum(1.0, np.max(np.abs(away) / reach, axis=1))[:, None]
+    found = np.tile(x, (2 * len(away), 1))
+    found[:, free] += np.vstack([away, -away])
+    return np.clip(found, layout.lower, layout.upper)
 
 
 class BetterPoint(Exception):  # noqa: N818  (it is no error)

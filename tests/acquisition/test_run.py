@@ -239,6 +239,21 @@ def test_a_standard_error_without_a_reader_counts_as_a_closed_terminal(
     assert record(LOADED, "sim", RIG_FILE, tmp_path / "on.h5").outcome == "finished"
 
 
+def test_a_driver_that_runs_at_another_rate_plays_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Faster(Troubled):
+        def load(self, waveform: GatedWaveform) -> float:
+            return 1.6 * super().load(waveform)
+
+    rig = Faster("never", fault)
+    monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
+    with pytest.raises(InputError, match="for which the limits were judged"):
+        record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5")
+    assert "arm" not in rig.diary
+    assert closed_at_zero(rig)
+
+
 def test_the_second_ctrl_c_is_0_volts_at_once(command, tmp_path: Path) -> None:
     rig = Troubled("read", lambda: keys(2))
     answer = command(rig)

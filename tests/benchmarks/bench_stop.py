@@ -1,36 +1,54 @@
-"""Delay of a press of STOP while a page of the window is opened for the first time.
+"""Delay of a press of STOP while the window does what takes longest, in the midst of a run.
 
-``python -m tests.benchmarks.bench_stop [--repeats 3]``: a run on the simulated rig in real time; in
-its midst each page that was not shown yet is opened, and presses of a key are sent all the time
-from another thread. The delay is the time from the sending of the press to its being heard. Work is
-the processor time of the window's thread between two presses that it has heard: a press waits as
-long on a computer that does nothing else. The first rows are of a window that makes a page when it
-is opened, the others of the window as it is.
+``python -m tests.benchmarks.bench_stop [--repeats 3] [--only Guide]``: a run on the simulated rig
+in real time, in a folder of 200 recordings; in its midst each page that was not shown yet is
+opened, and each other act of ``acts`` is done, while presses of a key are sent all the time from
+another thread. The delay is the time from the sending of the press to its being heard. Work is the
+processor time of the window's thread between two presses that it has heard: a press waits as long
+on a computer that does nothing else. The first rows are of a window that makes a page when
+it is opened, the others of the window as it is.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # before Qt is loaded
 
 import numpy as np
-from PySide6.QtCore import QEvent, QEventLoop, QSettings, QTimer
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QEvent, QEventLoop, QSettings, Qt, QTimer
+from PySide6.QtWidgets import QApplication, QDialog
 
+from dearig.report.study_view import view_of
+from dearig.window.documents.dialogs import ask, choose_file
 from dearig.window.jobs.collector import Collector
 from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.recordings.page import RecordingsPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from dearig.window.shell.pages import PAGES
+from dearig.window.study.page import StudyPage
 from tests.benchmarks.bench_window import Listener, run_event_loop
+from tests.report.test_study_file import made as study_on_paper
+from tests.tools.diagnosis import diagnose_outcome
+from tests.window.made_recordings import of_rig
 
-PATIENCE = 120.0  # s
+PATIENCE = 600.0  # s
+MANY = 200  # recordings
+SEQUENCE = """\
+name = "bench"
+[[segment]]
+kind = "half_sine"
+amplitude_kV = 6.0
+frequency_Hz = 0.5
+repeats = 1000
+"""
 
 
 class Presses(Listener):
@@ -59,63 +77,131 @@ def until(condition: Callable[[], bool]) -> None:
         loop.exec()
 
 
-def measure(ready: bool) -> dict[str, list[tuple[float, float]]]:
-    """Return delays and work in ms by the page that was opened; ``ready``: as the window is."""
+def many_recordings(folder: Path) -> None:
+    """Fill ``folder`` with recordings of the thesis's run."""
+    first = of_rig(folder, "thesis-000", "sim:3")
+    for number in range(1, MANY):
+        shutil.copyfile(first, folder / f"thesis-{number:03d}.h5")
+
+
+def answered(show: Callable[[], object]) -> None:
+    """Show a dialog, and close it after a while."""
+
+    def close() -> None:
+        for widget in QApplication.topLevelWidgets():
+            if isinstance(widget, QDialog) and widget.isVisible():
+                widget.reject()
+
+    QTimer.singleShot(500, close)
+    show()
+
+
+def acts(window: MainWindow, folder: Path) -> Iterator[tuple[str, Callable[[], object]]]:
+    """Yield what an operator does during a run, by name; each act follows the one before."""
+    session = window.session
+    recordings, study = window.page(RecordingsPage), window.page(StudyPage)
+    table = recordings.table
+    paths = sorted(folder.glob("*.h5"))
+    window.show_page(recordings)
+    yield "Recordings: select all", table.selectAll
+    yield "Recordings: search", lambda: recordings.filter.setText("thesis-01")
+    yield "Recordings: search ends", recordings.filter.clear
+    yield "Recordings: sort", lambda: table.sortByColumn(2, Qt.SortOrder.AscendingOrder)
+    for place in (1, 2, 3, 0):
+        name = recordings.views.tabText(place)
+        yield (
+            f"Recordings: {name}",
+            lambda place=place: recordings.views.setCurrentIndex(place),
+        )
+    window.show_page(study)
+    view = view_of(study_on_paper(folder / "study-1", diagnose_outcome(title="bench")))
+    yield "Study: check all", lambda: study.recordings.check(paths[1:], paths[:1])
+    yield "Study: check none", lambda: study.recordings.check([], [])
+    yield "Study: a result arrives", lambda: study.show_view(view)
+    for place in range(study.tabs.count()):
+        name = study.tabs.tabText(place)
+        yield f"Study: {name}", lambda place=place: study.tabs.setCurrentIndex(place)
+    yield "Guide", window.show_guide
+    yield (
+        "File chooser",
+        lambda: answered(lambda: choose_file(window, session, "Open", folder, "All (*)")),
+    )
+    yield "Question", lambda: answered(lambda: ask(window, session, "Ask", "Is it?", "Yes", "No"))
+    yield "Another colour scheme", lambda: window.set_colour_scheme("dark")
+    yield "Error of the program", window.error_panel.show_errors
+    yield "Reset layout", window.reset_layout
+
+
+def heard(act: Callable[[], object]) -> list[tuple[float, float]]:
+    """Return delays and work in ms of the presses that are sent while ``act`` is done."""
+    listener = Presses()
+    run_event_loop(0.2)
+    act()
+    run_event_loop(0.8)
+    listener.close()
+    run_event_loop(0.05)
+    return [(1e3 * d, 1e3 * w) for d, w in zip(listener.delays, listener.worked, strict=False)]
+
+
+def measure(ready: bool, folder: Path, only: str) -> dict[str, list[tuple[float, float]]]:
+    """Return delays and work in ms by what was done; ``ready``: as the window is."""
     delays: dict[str, list[tuple[float, float]]] = {}
-    with tempfile.TemporaryDirectory(prefix="dearig-stop-") as folder:
-        settings = QSettings(str(Path(folder, "x.ini")), QSettings.Format.IniFormat)
-        window = MainWindow(Session(Path(folder), settings, theme=LIGHT))
-        if not ready:
-            window.idle_pages.close()
-        window.resize(1366, 768)
-        window.show()
-        run = window.run_page
-        until(lambda: window.session.preview is not None)
-        if ready:
-            until(lambda: window.idle_pages.done)
-        run_event_loop(1.0)
-        until(lambda: run.arm_button.isEnabled() and run.arm_button.answers)
-        run.runner.arm(True)
-        until(run.start_button.isEnabled)
-        run.start()
-        until(lambda: run.live is not None and run.live.now() is not None)
-        run_event_loop(1.0)
-        for kind in PAGES:
-            if kind is type(run):
-                continue
-            listener = Presses()
-            run_event_loop(0.2)
-            window.list.setCurrentRow(PAGES.index(kind))
-            run_event_loop(0.8)
-            listener.close()
-            run_event_loop(0.05)
-            pairs = zip(listener.delays, listener.worked, strict=False)
-            delays[kind.title] = [(1e3 * d, 1e3 * w) for d, w in pairs]
-        window.leave()
-        until(lambda: not run.runner.running)
-        window.leave()
+    settings = QSettings(str(folder / "x.ini"), QSettings.Format.IniFormat)
+    settings.clear()
+    window = MainWindow(Session(folder, settings, theme=LIGHT))
+    if not ready:
+        window.idle_pages.close()
+    window.resize(1366, 768)
+    window.show()
+    run = window.run_page
+    window.session.set_sequence(SEQUENCE, folder)
+    until(lambda: window.session.preview is not None)
+    if ready:
+        until(lambda: window.idle_pages.done and not window.library.left)
+    run_event_loop(1.0)
+    until(lambda: run.arm_button.isEnabled() and run.arm_button.answers)
+    run.runner.arm(True)
+    until(run.start_button.isEnabled)
+    run.start()
+    until(lambda: run.live is not None and run.live.now() is not None)
+    run_event_loop(1.0)
+    for kind in PAGES:
+        if kind is not type(run) and only in kind.title:
+            row = PAGES.index(kind)
+            delays[kind.title] = heard(lambda row=row: window.list.setCurrentRow(row))
+    for name, act in acts(window, folder) if ready else ():
+        if only in name:
+            delays[name] = heard(act)
+    window.set_colour_scheme("light")
+    window.leave()
+    until(lambda: not run.runner.running)
+    window.leave()
     return delays
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--only", default="", help="acts whose name holds this")
     given = parser.parse_args()
     application = QApplication([])
     prepare_plots()
     collector = Collector(application)
-    print("| window | page | presses | delay, ms: median | worst | work, ms: worst |")
+    print("| window | page or act | presses | delay, ms: median | worst | work, ms: worst |")
     print("|---|---|---|---|---|---|")
-    for ready in (False, True):
-        found: dict[str, list[tuple[float, float]]] = {}
-        for _ in range(given.repeats):
-            for title, delays in measure(ready).items():
-                found.setdefault(title, []).extend(delays)
-        words = "as it is" if ready else "pages made when opened"
-        for title, delays in found.items():
-            late, worked = np.array(delays).T
-            row = f"| {words} | {title} | {late.size} | {np.median(late):.1f} | {late.max():.0f} |"
-            print(f"{row} {worked.max():.0f} |", flush=True)
+    with tempfile.TemporaryDirectory(prefix="dearig-stop-") as place:
+        folder = Path(place)
+        many_recordings(folder)
+        for ready in (False, True):
+            found: dict[str, list[tuple[float, float]]] = {}
+            for _ in range(given.repeats):
+                for title, delays in measure(ready, folder, given.only).items():
+                    found.setdefault(title, []).extend(delays)
+            words = "as it is" if ready else "pages made when opened"
+            for title, delays in found.items():
+                late, worked = np.array(delays).T
+                row = f"| {words} | {title} | {late.size} | {np.median(late):.1f} |"
+                print(f"{row} {late.max():.0f} | {worked.max():.0f} |", flush=True)
     collector.close()
 
 

@@ -216,6 +216,18 @@ def test_margins_say_how_near_it_comes():
     assert str(margins["negative voltage"].reached) == "0.0"
 
 
+@pytest.mark.parametrize("part", [1.0, 1.0 + 2e-3, 1.0 - 2e-3])
+def test_a_rate_that_a_card_rounds_is_played(part):
+    gate(np.zeros(4)).check_rate(part * RATE)
+
+
+@pytest.mark.parametrize("part", [1.613, 1.01, 0.99, 0.0, -1.0, math.nan, math.inf])
+def test_a_rate_that_was_not_judged_is_refused(part):
+    # at 1.6 times the rate the slew is 1.6 times what passed
+    with pytest.raises(RefusedWaveform, match="in place of 1000 Hz"):
+        gate(np.zeros(4)).check_rate(part * RATE)
+
+
 def test_no_other_way_in():
     with pytest.raises(TypeError, match=r"only drivers\.gate\.admit can make"):
         GatedWaveform(np.zeros(2), RATE, LIMITS, (), object())

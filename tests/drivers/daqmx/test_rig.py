@@ -18,7 +18,8 @@ from dearig.drivers.daqmx import inspect, link
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.daqmx.guardian import TakeOver
 from dearig.drivers.daqmx.rig import DaqmxRig
-from dearig.drivers.errors import RigError
+from dearig.drivers.daqmx.tasks import ClockedTasks
+from dearig.drivers.errors import RefusedWaveform, RigError, RigStateError
 from dearig.drivers.rig import RigState
 from dearig.model.film.material import THESIS_FILM, THESIS_LOAD
 from dearig.sim_backend.clock import ManualClock
@@ -370,6 +371,21 @@ def test_faults_of_the_card(fault, code, said):
         assert caught.value.code == code
         bench.rig.make_safe()
         assert bench.device.wire_voltage() == 0.0
+
+
+def test_a_card_that_has_only_another_rate_plays_nothing(bench, monkeypatch):
+    def faster(tasks, command, rate):
+        return 1.6 * prepare(tasks, command, rate)
+
+    prepare = ClockedTasks.prepare
+    monkeypatch.setattr(ClockedTasks, "prepare", faster)
+    with pytest.raises(RefusedWaveform, match="1600 Hz in place of 1000 Hz"):
+        bench.rig.load(LONG)
+    assert bench.rig.state is RigState.SAFE
+    with pytest.raises(RigStateError):
+        bench.rig.arm()
+    monkeypatch.undo()
+    bench.rig.load(LONG)  # its tasks were cleared, so that the card is free
 
 
 def test_a_mistake_while_making_safe_still_asks_the_guardian(monkeypatch):

@@ -158,6 +158,9 @@ def test_what_goes_beyond_training_is_known_without_an_error() -> None:
     assert edges is not None
     found = excitation([motion("thesis")], motion(EDGES), error(EDGES, DAMPED))
     assert [b.low for b in edges.bands] == pytest.approx([b.low for b in found.undetermined])
+    # half a per cent farther, by more than the noise
+    assert float(np.max(motion("validation-a-1.0").response)) > shown.high + NOISE
+    assert shown.beyond(motion("validation-a-1.0")) is None
     louder = shown.beyond(motion("thesis", scale=1.2))
     assert louder is not None
     assert louder.levels
