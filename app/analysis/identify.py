@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dearig.acquisition.interrupts import Interrupts
 from dearig.analysis.budget import given_values
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.outcomes import (
@@ -61,6 +62,11 @@ __all__ = ["CHOOSE", "identify_recordings"]
 #: In place of a strain energy: the most probable one.
 CHOOSE = "choose"
 
+_INTERRUPTED = (
+    "interrupted: intervals that were not finished are from the curvature at the optimum, and "
+    "uncertainties of given values may be left out"
+)
+
 
 @for_simulations()
 def identify_recordings(
@@ -93,8 +99,9 @@ def identify_recordings(
     ``effects`` are fitted too, from these values. ``parameters`` are what is stated of parameters
     (``dearig.config.parameterfile``); models with fewer branches leave out what they lack.
     ``ended_early`` is keep, cut or leave-out: what is done with recordings whose runs ended early.
-    ``clock`` gives seconds. Nothing is written; ``save_fitted_model`` writes the model. Raises
-    ``InputError`` for everything that cannot be fitted.
+    ``clock`` gives seconds. While intervals are computed, the first ctrl-C ends them and keeps the
+    fit (``interrupted``); the second raises. Nothing is written; ``save_fitted_model`` writes the
+    model. Raises ``InputError`` for everything that cannot be fitted.
     """
     check_named_once(train, validation)
     started = clock()
@@ -127,9 +134,8 @@ def identify_recordings(
     alone = len(counts) == 1
 
     fits = _fits(
-        records, lambda n: base_of(n, spring), counts, method, seed, intervals and alone, start,
-        stated, progress,
-    )  # fmt: skip
+        records, lambda n: base_of(n, spring), counts, method, seed, start, stated, progress
+    )
     # one number of independent samples for all, from the fit with the least structured residual
     correlation = max(1.0, min(fit.correlation for fit in fits))
     scores = [_bic(fit, records, correlation) for fit in fits]
@@ -141,9 +147,13 @@ def identify_recordings(
             _trial(n, candidate, fitted, others, score, chosen=n == count)
             for n, candidate, score in zip(counts, fits, scores, strict=True)
         ]
+    # the fit is there: from here on the first ctrl-C leaves out what is not done
+    with Interrupts() as interrupts:
+        stop = interrupts.asked
         if intervals and method == "hybrid":
-            fit = add_intervals(records, fit, progress=progress)
-    fit = with_budget(records, fit, given, progress=progress)
+            fit = add_intervals(records, fit, progress=progress, ended=stop)
+        fit = with_budget(records, fit, given, progress=progress, stop=stop)
+    interrupted = interrupts.asked()
     compared = [compare(r, fit.model, "train") for r in fitted]
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
@@ -169,12 +179,14 @@ def identify_recordings(
             *left_out,
             *also_left_out,
             *_without_part(stated, fit),
+            *([_INTERRUPTED] if interrupted else []),
             *noise_texts((*fitted, *others)),
             *room_texts(recordings_of((*fitted, *others))),
         ),
         few_data=few_data(fitted),
         assumed=assumed_by(recordings, rig_file),
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
+        interrupted=interrupted,
     )
 
 
@@ -237,7 +249,6 @@ def _fits(
     counts: Sequence[int],
     method: str,
     seed: int,
-    intervals: bool,
     smaller: Network | None,
     stated: Sequence[Constraint],
     progress: Progress,
@@ -259,9 +270,8 @@ def _fits(
 
         try:
             fit = identify(
-                records, base, method, seed, intervals, smaller, progress=report,
-                constraints=stated,
-            )  # fmt: skip
+                records, base, method, seed, False, smaller, progress=report, constraints=stated
+            )
         except ModelError as error:
             raise InputError(f"these recordings cannot be fitted: {error}") from error
         smaller = fit.model.network

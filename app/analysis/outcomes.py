@@ -224,7 +224,8 @@ class IdentifyOutcome:
     ``model`` is the fitted model with its history; ``model_path`` is where it was saved, "" if it
     was not. ``quality`` are sentences on recordings, ``few_data`` says how few data were fitted,
     "" if there are enough. ``assumed`` says which values of the film and the load no recording
-    has, "" if none. ``seconds`` is the computing time.
+    has, "" if none. ``seconds`` is the computing time. ``interrupted`` is True where the operator
+    ended it while intervals were computed: those that were left are by the curvature.
     """
 
     title: str
@@ -242,6 +243,7 @@ class IdentifyOutcome:
     few_data: str = ""
     assumed: str = ""
     published_fit: Published | None = None
+    interrupted: bool = False
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,8 @@ def compute(
         outcome = identify_recordings(
             [recording], branches=(campaign.branches,), rig_file=rig_file, progress=progress
         )
+        if outcome.interrupted:
+            raise Interrupted("interrupted during the fit after a run, at 0 V")
         found.numbers |= numbers_of(outcome)
         path = folder / MODELS / f"{recording.stem}.toml"
         path.parent.mkdir(exist_ok=True)

@@ -226,6 +226,8 @@ def _computed(recording: Recording, options: StudyOptions, progress: Progress) -
             [recording], branches=(options.branches,), spring=options.spring, drive=options.drive,
             intervals=options.intervals, ended_early=options.ended_early, progress=progress,
         )  # fmt: skip
+        if fitted.interrupted:
+            raise KeyboardInterrupt
         return {
             **parameter_columns(parameters_of(fitted)),
             **errors_of(fitted.train[0]),

@@ -19,6 +19,7 @@ from dearig.analysis.validate import validate_model
 from dearig.config.presets import VALIDATION_A, VALIDATION_B
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
+from dearig.errors import Interrupted
 from dearig.progress import Progress, quiet
 from dearig.recording.result_folder import result_folder
 from dearig.report.figures.export import save_png
@@ -76,6 +77,8 @@ def run_demo(
         out / "model.toml",
         overwrite,
     )
+    if identified.interrupted:
+        raise Interrupted("interrupted: the fit found before that was kept")
     validated = validate_model(
         out / "model.toml", [files[p] for p in presets[1:]], progress=progress
     )

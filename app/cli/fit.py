@@ -243,6 +243,8 @@ def identify(
     if report is not None:
         print_line(console, f"Report: {report}")
     write_result(lambda: result_json(outcome), json)
+    if outcome.interrupted:
+        raise Interrupted("interrupted: the fit found before that was kept")
 
 
 def _branches(text: str) -> list[int]:

@@ -112,6 +112,8 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")
     silence_libraries()
     _give_matplotlib_a_folder()
+    # numba's colours, by colorama, would write an escape sequence behind the last line
+    os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
     with (
         _printable_output(), log_file.attached() as written, _terminal(),
         _unexpected_errors_logged(written), _library_warnings_logged(),

@@ -13,7 +13,7 @@ from dearig.analysis.outcomes import (
     pooled_over_noise,
     pooled_steady_rms,
 )
-from dearig.model.verdict import is_rejected, smallest_p
+from dearig.model.verdict import COMPLETE, STOPPED, is_rejected, smallest_p
 from dearig.report.made import made_now
 from dearig.report.stored import Outcome, stored
 from dearig.report.text.bands import band_json
@@ -79,11 +79,16 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "kind": outcome.kind,
         "method": outcome.method,
         "converged": bool(fit.converged),
+        "status": STOPPED if outcome.interrupted else COMPLETE,
         "model_path": outcome.model_path,
         **_noise_json(outcome.kind, outcome.train),
         "residual_over_noise": _number(pooled_over_noise(outcome.train)),
         **_rejection_json(outcome.train),
         "prior_p": _number(fit.prior_p),
+        "starts": [
+            {"mean_square_over_noise": _number(cost), "followed": followed}
+            for cost, followed in fit.starts
+        ],
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
         "sums": [_parameter_json(e, known) for e in fit.sums],
         "covariance": covariance_table(fit.covariance_names, fit.covariance),

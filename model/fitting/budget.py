@@ -41,17 +41,18 @@ def with_budget(
     given: Sequence[GivenValue],
     workers: int = 2,
     progress: Progress = lambda *_: None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> Identification:
     """Return ``fitted`` with the ``systematic`` uncertainty of each estimate; of actuators only.
 
-    ``records`` are its training records.
+    ``records`` are its training records. Without, where ``stop()`` is True before the end.
     """
     model = fitted.model
     if not isinstance(model, Actuator) or not given:
         return fitted
     held = np.isin(FitLayout(model).names, fitted.held_limits)
     found = uncertainty_budget(
-        records, model, held, given, workers, progress, constraints=fitted.constraints
+        records, model, held, given, workers, progress, stop, fitted.constraints
     )
     return replace(fitted, estimates=with_systematic(fitted.estimates, found), budget=found)
 

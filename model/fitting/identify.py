@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -63,6 +63,7 @@ METHODS = ("hybrid", "de")
 
 # Hz: resolves relaxation times of tens of milliseconds; thinning raises it where means would not do
 _COARSE_RATE = 50.0
+_LEADERS = 2  # starts that are followed to their ends
 _POPULATIONS = 20.0  # simulated until a descent counts as half done
 _COARSE_SAMPLES = 1500  # of a film record
 _MISFIT = 1.5  # mean square over noise, where the readings at rest do not tell
@@ -103,7 +104,8 @@ class Identification:
     of given values to the uncertainty (``dearig.model.fitting.budget``). ``constraints`` are what
     was stated of parameters, ``prior_chi2`` the chi-square of their priors, which ``cost`` leaves
     out, and ``prior_p`` the probability that priors are as far from what the data say (None
-    without).
+    without). ``starts`` are those of the global search, best first: the cost that each reached on
+    means of the readings, and whether it was followed to its end; () without a search.
     """
 
     method: str
@@ -123,6 +125,7 @@ class Identification:
     constraints: tuple[Constraint, ...] = ()
     prior_chi2: float = 0.0
     prior_p: float | None = None
+    starts: tuple[tuple[float, bool], ...] = ()
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -181,10 +184,12 @@ def add_intervals(
     fitted: Identification,
     workers: int = 2,
     progress: Progress = _quiet,
+    ended: Callable[[], bool] = lambda: False,
 ) -> Identification:
     """Return ``fitted`` with 95 % intervals; ``records`` are its training records.
 
     Where a profile comes to a better point, the fit moves there, and the intervals are about that.
+    Once ``ended()`` is True, the intervals that are left come from the curvature at the optimum.
     """
     layout = FitLayout(fitted.model, constraints=fitted.constraints)
     problem = Problem(records, layout, workers)
@@ -194,7 +199,7 @@ def add_intervals(
     gain: float | None = None
     for _ in range(MOVES_MAX):
         try:
-            found = _intervals(problem, layout.initial(), held, progress, gain)
+            found = _intervals(problem, layout.initial(), held, progress, gain, ended)
         except BetterPoint as better:
             x = better.x
             if isinstance(layout.base, Actuator):
@@ -205,8 +210,9 @@ def add_intervals(
             here = problem.costs(layout.coordinates(layout.initial())[None])[0]
             if fit.cost < here:
                 fitted = _result(
-                    problem, fitted.method, fit, layout.values(fit.x), "", fitted.held_limits
-                )
+                    problem, fitted.method, replace(fit, starts=fitted.starts),
+                    layout.values(fit.x), "", fitted.held_limits,
+                )  # fmt: skip
                 layout = FitLayout(fitted.model, constraints=fitted.constraints)
                 problem.layout = layout
             else:
@@ -215,7 +221,7 @@ def add_intervals(
         else:
             break
     if found is None:
-        found = _intervals(problem, layout.initial(), held, progress, math.inf)
+        found = _intervals(problem, layout.initial(), held, progress, math.inf, ended)
     warnings = fitted.warnings
     if found.sums:
         warnings = (*warnings, sums_text(found.sums))
@@ -306,6 +312,7 @@ def _result(
         constraints=layout.constraints,
         prior_chi2=float(rows @ rows),
         prior_p=prior_p,
+        starts=fit.starts,
     )
 
 
@@ -436,13 +443,14 @@ def fit_globally(
     for start in starts:
         fits.append(descend(scouts, start, first, iterations=_SCOUT_ITERATIONS))
         descents.ended()
-    # two, because the best after a few steps is not always the best at the end
-    leaders = sorted(fits, key=lambda f: f.cost)[:2]
+    # not one, because the best after a few steps is not always the best at the end
+    ranked = sorted(fits, key=lambda f: f.cost)
     ends = []
-    for leader in leaders:
+    for leader in ranked[:_LEADERS]:
         ends.append(descend(scouts, leader.x, first))
         descents.ended()
     x = min(ends, key=lambda f: f.cost).x
+    reached = [(f.cost, True) for f in ends] + [(f.cost, False) for f in ranked[_LEADERS:]]
     if driven_by_voltage:
         x = _descend_on_means(problem, coarse, x, first)
         descents.ended()
@@ -463,7 +471,7 @@ def fit_globally(
     problem.simulations += coarse.simulations
     if scouts is not coarse:
         problem.simulations += scouts.simulations
-    return fit, first
+    return replace(fit, starts=tuple(sorted(reached))), first
 
 
 def _of_resolved_times(means: Problem) -> Problem:
@@ -520,6 +528,7 @@ def _intervals(
     held: np.ndarray,
     progress: Progress,
     gain: float | None,
+    ended: Callable[[], bool],
 ) -> Intervals:
     """Return estimates with profile-likelihood intervals; ``held`` (d,) limits are undetermined."""
     if not isinstance(problem.layout.base, Actuator):
@@ -533,6 +542,7 @@ def _intervals(
         values,
         held,
         lambda part: progress("intervals", min(part, 1.0)),
+        ended=ended,
         gain=gain,
         finer=levels[1] if len(levels) > 1 else None,
     )

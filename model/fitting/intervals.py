@@ -43,6 +43,7 @@ _NEAR = 0.06  # of the threshold's root: tolerance of its crossing
 _NEAR_A_LIMIT = 0.3  # the same for an undetermined limit, which is bounded to decades only
 _SHORTER = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, tried in turn
 _BY_CHANCE = 0.01  # significance level: share of white noise that the test rejects
+_EXPONENT_MAX = 700.0  # of a number that the machine has
 _GUESS_MAX = 1e4  # thresholds above the optimum from which a refit takes a few iterations
 
 
@@ -141,7 +142,8 @@ def natural_ends(q: FreeParameter, low: float, high: float) -> tuple[float, floa
     that of a stated range the bound. A modulus at the lower end of its search range is 0.
     """
     if q.logarithmic:
-        low, high = math.exp(low), math.exp(high)
+        # beyond it an exponential is infinite
+        low, high = (math.exp(x) if x < _EXPONENT_MAX else math.inf for x in (low, high))
     lowest, highest = q.open_ends
     if q.kind == "mu" and low <= q.search_range[0]:
         low = 0.0

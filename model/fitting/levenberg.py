@@ -30,7 +30,8 @@ class LocalFit:
     ``jacobian`` (N, f) over the free coordinates is that of the last iteration, at ``x`` or one
     step before. ``to_gain`` is what the quadratic model at ``x`` would still take off chi-square, 0
     where there is none at ``x``. ``beside`` (N, b) are the columns of other parameters where
-    ``jacobian`` is, as far as they were asked for.
+    ``jacobian`` is, as far as they were asked for. ``starts`` are those of the global search that
+    led here, best first: the cost that each reached, and whether it was followed to its end.
     """
 
     x: np.ndarray
@@ -41,6 +42,7 @@ class LocalFit:
     converged: bool
     to_gain: float = 0.0
     beside: np.ndarray | None = None
+    starts: tuple[tuple[float, bool], ...] = ()
 
 
 def descend(

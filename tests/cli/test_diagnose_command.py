@@ -78,6 +78,7 @@ def instead(monkeypatch: pytest.MonkeyPatch, *found: Diagnosis) -> list[int]:
         stop: Callable,
         thorough: bool,
         others: list,
+        constraints: tuple,
     ) -> Diagnosis:
         seen.append(len(records))
         progress("search", 0.5)
@@ -210,7 +211,7 @@ class TestOutputs:
         assert "Residual explained; by which effect these data cannot tell" in answer.err
 
     def test_an_interruption_keeps_what_was_found(self, bench, tmp_path, monkeypatch):
-        def search(records, base, *, progress, stop, thorough, others):
+        def search(records, base, *, progress, stop, thorough, others, constraints):
             assert not stop()
             signal.raise_signal(signal.SIGINT)
             assert stop()
@@ -232,7 +233,7 @@ class TestOutputs:
     def test_a_search_is_as_thorough_as_it_is_asked_to_be(self, bench, monkeypatch, words):
         asked = []
 
-        def search(records, base, *, progress, stop, thorough, others):
+        def search(records, base, *, progress, stop, thorough, others, constraints):
             asked.append(thorough)
             return finding()
 
@@ -241,7 +242,7 @@ class TestOutputs:
         assert asked == [bool(words)]
 
     def test_the_second_interruption_ends_at_once(self, bench, tmp_path, monkeypatch):
-        def search(records, base, *, progress, stop, thorough, others):
+        def search(records, base, *, progress, stop, thorough, others, constraints):
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGINT)
             raise AssertionError("it went on")

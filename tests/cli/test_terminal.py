@@ -197,7 +197,7 @@ class TestJson:
         assert found["J_1"] == {
             "name": "J_1", "value": 1e4, "unit": "", "ci95": [None, None], "determined": False,
             "free": True, "at_bound": False, "systematic": 0.0, "ci95_combined": [None, None],
-            "note": "not determined by these data",
+            "note": "not determined by these data", "fixed": False, "bounds": None, "prior": None,
         }  # fmt: skip
         assert found["mu_0"]["free"] is False
 

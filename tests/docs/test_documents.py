@@ -21,12 +21,15 @@ from typer.main import get_command
 from dearig.cli.main import app
 from dearig.config.campaignfile import parse_campaign
 from dearig.config.modelfile import load_model
+from dearig.config.parameterfile import constraints_of, stated_of
 from dearig.config.rigfile import load_rig_file
 from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.sequencefile import parse_sequence
 from dearig.config.targetfile import parse_target
 from dearig.docs import pages
 from dearig.docs.site import anchors
+from dearig.model.film.material import Branch, Network, Spring
+from dearig.model.simulation.strip import Strip
 from tests.docs import reference
 from tests.docs.markdown import (
     ROOT,
@@ -164,11 +167,17 @@ def test_every_toml_example_is_accepted(block: Block, tmp_path: Path) -> None:
     accept_toml(block.text, tmp_path)
 
 
+#: A model with all springs that examples of parameter files name.
+KNOWN = Strip(Network(Spring(1e5, 1e4), tuple(Branch(Spring(1e5, 1e4), 1.0) for _ in range(3))))
+
+
 def accept_toml(text: str, folder: Path) -> None:
     """Fail unless the reader that such a file is for takes it."""
     content = tomllib.loads(text)
     keys = {key for table in content.get("segment", ()) for key in table}
-    if any(key.endswith("_mm") for key in keys):
+    if "mu_0_kPa" in content:
+        assert constraints_of(stated_of(content), [KNOWN], with_effects=True)
+    elif any(key.endswith("_mm") for key in keys):
         parse_target(text, "example", folder)
     elif "segment" in content and "name" not in content:  # a part of a sequence
         for table in content["segment"]:

@@ -41,6 +41,8 @@ __all__ = [
     "correlations",
     "parameter_columns",
     "parameters_figure",
+    "starts_columns",
+    "starts_figure",
 ]
 
 #: Parameters up to which a matrix has numbers, and the correlation from which its cells are dark.
@@ -95,6 +97,42 @@ def parameter_columns(fit: Identification) -> tuple[tuple[str, list[object]], ..
     names = ("parameter", "unit", "value", "low95", "high95", "determined", "thesis_table_3")
     columns = zip(*rows, strict=True)
     return tuple((name, list(column)) for name, column in zip(names, columns, strict=True))
+
+
+def starts_columns(fit: Identification) -> tuple[tuple[str, list[object]], ...]:
+    """Return the data of ``starts_figure``."""
+    return (
+        ("start", list(range(1, len(fit.starts) + 1))),
+        ("mean_square_over_noise", [cost for cost, _ in fit.starts]),
+        ("followed_to_its_end", ["yes" if followed else "no" for _, followed in fit.starts]),
+    )
+
+
+def starts_figure(fit: Identification) -> Figure:
+    """Draw what each start of the global search reached, sorted: a plateau is one optimum."""
+    costs = np.array([cost for cost, _ in fit.starts])
+    followed = np.array([end for _, end in fit.starts], dtype=bool)
+    number = np.arange(1, costs.size + 1)
+    with style():
+        figure = blank(WIDTH, 2.1)
+        ax = figure.subplots()
+        ax.plot(number, costs, color=MARK, linewidth=0.8, zorder=1)
+        for which, fill, label in (
+            (followed, MEASURED, "followed to its end"),
+            (~followed, "white", "left after its first steps"),
+        ):
+            if which.any():
+                ax.plot(
+                    number[which], costs[which], "o", color=MEASURED, markerfacecolor=fill,
+                    markersize=5.0, label=label,
+                )  # fmt: skip
+        left, right = costs.min() / 1.6, costs.max() * 1.6
+        log_axis(ax, "y", left, right)
+        ax.set_xticks(number)
+        ax.set_xlabel("Start, the best first")
+        ax.set_ylabel("Mean square\nover noise")
+        legend(ax, 2)
+    return figure
 
 
 def correlations(covariance: np.ndarray) -> np.ndarray:

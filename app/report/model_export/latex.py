@@ -15,6 +15,7 @@ from dearig.report.text.numbers import interval_ends, quoted, significant
 
 __all__ = ["latex_page"]
 
+_FIXED = "fixed"  # in place of the interval of a parameter that was stated
 _HEAD = r"""\documentclass[11pt]{article}
 \usepackage[T1]{fontenc}
 \usepackage[utf8]{inputenc}
@@ -134,7 +135,10 @@ def _effect_lines(
 
 
 def _estimates(history: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """Intervals (low, high) by parameter, as far as the history has them; None is an open end."""
+    """Intervals (low, high) by parameter, as far as the history has them; None is an open end.
+
+    Of a parameter that was stated, not fitted, both are ``_FIXED``.
+    """
     tables = [*history.get("estimate", [])]
     for step in history.get("step", []):
         if isinstance(step, Mapping):
@@ -144,15 +148,24 @@ def _estimates(history: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
                 if isinstance(e, Mapping)
             ]
     return {
-        str(t["name"]): (t.get("low95"), t.get("high95"))
+        str(t["name"]): (_FIXED, _FIXED) if _is_fixed(t) else (t.get("low95"), t.get("high95"))
         for t in tables
-        if isinstance(t, Mapping) and "name" in t and ("low95" in t or "high95" in t)
+        if isinstance(t, Mapping)
+        and "name" in t
+        and ("low95" in t or "high95" in t or _is_fixed(t))
     }
+
+
+def _is_fixed(table: Mapping[str, Any]) -> bool:
+    stated = table.get("stated")
+    return isinstance(stated, Mapping) and "fixed" in stated
 
 
 def _row(symbol: str, value: float, unit: str, interval: tuple[Any, Any] | None) -> str:
     if interval is None:
         return rf"${symbol}$ & {_math(significant(value, 6))} & {unit} & \\"
+    if interval[0] == _FIXED:
+        return rf"${symbol}$ & {_math(significant(value, 6))} & {unit} & {_FIXED} \\"
     low = -math.inf if interval[0] is None else float(interval[0])
     high = math.inf if interval[1] is None else float(interval[1])
     shown = _math(quoted(value, low, high))

@@ -20,6 +20,8 @@ from dearig.report.figures.parameters import (
     correlation_figure,
     parameter_columns,
     parameters_figure,
+    starts_columns,
+    starts_figure,
 )
 from dearig.report.figures.recordings import comparison_figure, loop_figure
 from dearig.report.figures.residual import residual_panels
@@ -317,6 +319,16 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
                 "Correlation of the fitted parameters. Near 1 or -1 the data determine a "
                 "combination of two parameters better than each of them.",
                 correlation_columns(fit.covariance_names, fit.covariance),
+            ),
+        )
+    if len(fit.starts) > 1:
+        parameter_pictures += (
+            picture(
+                starts_figure(fit),
+                prefixes,
+                "What each start of the global search reached on means of the readings, sorted. "
+                "Several at one height came to one optimum; the best were followed to their ends.",
+                starts_columns(fit),
             ),
         )
     branch_tables: tuple[Table, ...] = ()

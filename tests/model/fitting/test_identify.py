@@ -80,6 +80,14 @@ def test_the_thesis_record_leaves_nothing_but_noise():
     assert fit.model.network.times == tuple(sorted(fit.model.network.times))
 
 
+def test_starts_are_kept_best_first():
+    starts = thesis_fit().starts
+    assert len(starts) > 2
+    assert [cost for cost, _ in starts] == sorted(cost for cost, _ in starts)
+    assert sum(followed for _, followed in starts) == 2
+    assert starts[0][0] == pytest.approx(1.0, abs=0.2)
+
+
 def test_the_truth_is_in_the_intervals():
     truth = truths(SORTED)
     outside = [e.name for e in thesis_fit().estimates if not e.low <= truth[e.name] <= e.high]

@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from dearig.report.figures.parameters import (
     correlation_columns,
     correlation_figure,
     parameters_figure,
+    starts_columns,
+    starts_figure,
 )
 from dearig.report.figures.residual import residual_figure, residual_panels
 from tests.tools.reports import (
@@ -225,6 +228,19 @@ class TestResidualFigure:
         names, *columns = correlation_columns(("mu_1", "T_1", "J_1"), covariance)
         assert names == ("parameter", ["mu_1", "T_1", "J_1"])
         assert [name for name, _ in columns] == ["mu_1", "T_1", "J_1"]
+
+    def test_starts_are_drawn_in_their_order(self):
+        searched = replace(fit(), starts=((1.0, True), (1.1, True), (3.0, False)))
+        figure = starts_figure(searched)
+        joined, ends, left = figure.axes[0].lines
+        np.testing.assert_allclose(joined.get_ydata(), [1.0, 1.1, 3.0])
+        np.testing.assert_allclose(ends.get_xdata(), [1, 2])
+        np.testing.assert_allclose(left.get_xdata(), [3])
+        assert figure.axes[0].get_yscale() == "log"
+        columns = dict(starts_columns(searched))
+        assert columns["mean_square_over_noise"] == [1.0, 1.1, 3.0]
+        assert columns["followed_to_its_end"] == ["yes", "yes", "no"]
+        assert len(starts_figure(replace(searched, starts=searched.starts[:2])).axes[0].lines) == 2
 
     @pytest.mark.parametrize("noise", [None, 0.0, 1e-12])
     def test_perfect_models_and_odd_noise(self, noise):

@@ -138,6 +138,7 @@ def test_the_page_has_the_equations_with_numbers_and_intervals() -> None:
     history = {"estimate": [
         {"name": "mu_0", "low95": 45e3, "high95": 46.5e3},
         {"name": "strained electrode: gauge", "low95": 13.5, "high95": 13.7},
+        {"name": "T_2", "stated": {"fixed": 0.3980}},
     ]}  # fmt: skip
     page = export_text(ModelFile("film_7 & more", model, history), "latex")
     for equation in EFFECTS["strained electrode"].law.equations:
@@ -146,6 +147,8 @@ def test_the_page_has_the_equations_with_numbers_and_intervals() -> None:
     (gauge,) = (line for line in page.splitlines() if "gauge relative" in line)
     assert "13.6" in gauge
     assert "[$13.500$, $13.700$]" in gauge
+    (fixed,) = (line for line in page.splitlines() if line.startswith("$T_{2}$"))
+    assert fixed.endswith(r"& fixed \\")
     for opened in re.findall(r"\\begin\{(\w+\*?)\}", page):
         assert page.count(f"\\begin{{{opened}}}") == page.count(f"\\end{{{opened}}}")
 

@@ -1,17 +1,21 @@
-"""What is known of parameters, by options and a file, as a user states it."""
+"""Options of ``dearig identify``: what is known of parameters; and its end by ctrl-C."""
 
 from __future__ import annotations
 
 import json
+import signal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from dearig.analysis import identify as identify_module
 from dearig.cli.options import stated_by
 from dearig.config.modelfile import load_model
 from dearig.errors import InputError
 from dearig.model.film.material import Branch, Network, Spring
+from dearig.model.fitting.estimates import BY_CURVATURE
 from dearig.model.simulation.strip import Strip
 from tests.tools.command import dearig, done, refused
 
@@ -126,4 +130,42 @@ def test_unknown_names_are_refused_before_the_fit(pull: Path, tmp_path: Path, co
     out = () if command == "diagnose" else ("--out", tmp_path / "m.toml")
     answer = dearig(command, pull, *out, "--fix", "mu_0=3")
     refused(answer, "mu_0 is not a parameter of this fit", "--fix")
+    assert not (tmp_path / "m.toml").exists()
+
+
+def test_ctrl_c_while_intervals_are_computed_keeps_the_fit(
+    pull: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = identify_module.add_intervals
+
+    def asked_to_end(*given: Any, **options: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return real(*given, **options)
+
+    monkeypatch.setattr(identify_module, "add_intervals", asked_to_end)
+    model, report, out = (tmp_path / name for name in ("m.toml", "report.html", "m.json"))
+    answer = dearig(
+        "identify", pull, "--branches", "1", "--out", model, "--report", report, "--json", out
+    )
+    assert answer.code == 130
+    assert answer.err.endswith("dearig: interrupted: the fit found before that was kept\n")
+    found = json.loads(out.read_text(encoding="utf-8"))
+    assert found["status"] == "stopped"
+    assert "interrupted" in " ".join(answer.out.split())
+    one = {p["name"]: p for p in found["parameters"]}
+    assert BY_CURVATURE in one["mu_0"]["note"]
+    assert one["mu_0"]["ci95"][0] < 40e3 < one["mu_0"]["ci95"][1]
+    assert load_model(model).model.network.equilibrium.modulus == one["mu_0"]["value"]
+    assert BY_CURVATURE in report.read_text(encoding="utf-8")
+
+
+def test_ctrl_c_during_the_fit_leaves_nothing(
+    pull: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def asked_to_end(*_given: Any, **_options: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(identify_module, "identify", asked_to_end)
+    answer = dearig("identify", pull, "--out", tmp_path / "m.toml")
+    assert (answer.code, answer.err) == (130, "dearig: interrupted\n")
     assert not (tmp_path / "m.toml").exists()
