@@ -47,6 +47,7 @@ from dearig.model.errors import ModelError
 from dearig.model.film.material import Network
 from dearig.model.fitting import (
     Constraint,
+    GivenValue,
     Identification,
     add_intervals,
     identify,
@@ -147,13 +148,8 @@ def identify_recordings(
             _trial(n, candidate, fitted, others, score, chosen=n == count)
             for n, candidate, score in zip(counts, fits, scores, strict=True)
         ]
-    # the fit is there: from here on the first ctrl-C leaves out what is not done
-    with Interrupts() as interrupts:
-        stop = interrupts.asked
-        if intervals and method == "hybrid":
-            fit = add_intervals(records, fit, progress=progress, ended=stop)
-        fit = with_budget(records, fit, given, progress=progress, stop=stop)
-    interrupted = interrupts.asked()
+    profiled = intervals and method == "hybrid"
+    fit, interrupted = _with_uncertainties(records, fit, given, profiled, progress)
     compared = [compare(r, fit.model, "train") for r in fitted]
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
@@ -188,6 +184,25 @@ def identify_recordings(
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
         interrupted=interrupted,
     )
+
+
+def _with_uncertainties(
+    records: Sequence[Record],
+    fit: Identification,
+    given: Sequence[GivenValue],
+    profiled: bool,
+    progress: Progress,
+) -> tuple[Identification, bool]:
+    """Return ``fit`` with intervals, if ``profiled``, and the budget of ``given`` values.
+
+    The first ctrl-C leaves out what is not done; the second value says whether it came.
+    """
+    with Interrupts() as interrupts:
+        stop = interrupts.asked
+        if profiled:
+            fit = add_intervals(records, fit, progress=progress, ended=stop)
+        fit = with_budget(records, fit, given, progress=progress, stop=stop)
+    return fit, interrupts.asked()
 
 
 def _without_part(stated: Sequence[Constraint], fit: Identification) -> list[str]:

@@ -57,6 +57,7 @@ if TYPE_CHECKING:  # jinja2 and matplotlib are loaded by the command that writes
     from matplotlib.figure import Figure
 
     from dearig.analysis.outcomes import Comparison, Published, ValidateOutcome
+    from dearig.model.fitting import Identification
 
 __all__ = [
     "Picture",
@@ -290,17 +291,9 @@ def prefixes() -> Iterator[str]:
     return (f"f{n}" for n in count(1))
 
 
-def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
-    fit = outcome.fit
-    # the published errors are those of one recording
-    published = outcome.published_fit if len(outcome.train) == 1 else None
-    errors = [_side("Training: recordings that were fitted", outcome.train, published)]
-    errors += _validation_sides(outcome.validation, "Validation: recordings that were not fitted")
-    overview, *others = _comparison_pictures(outcome.train, prefixes)
-    pictures = [("Training", tuple(others))] if others else []
-    if outcome.validation:
-        pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
-    parameter_pictures: tuple[Picture, ...] = (
+def _parameter_pictures(fit: Identification, prefixes: Iterator[str]) -> tuple[Picture, ...]:
+    """Return the figures of the parameters: intervals, correlation, starts of the search."""
+    found: tuple[Picture, ...] = (
         picture(
             parameters_figure(fit),
             prefixes,
@@ -312,7 +305,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         ),
     )
     if fit.covariance.size > 1:
-        parameter_pictures += (
+        found += (
             picture(
                 correlation_figure(fit.covariance_names, fit.covariance),
                 prefixes,
@@ -322,7 +315,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             ),
         )
     if len(fit.starts) > 1:
-        parameter_pictures += (
+        found += (
             picture(
                 starts_figure(fit),
                 prefixes,
@@ -331,6 +324,20 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
                 starts_columns(fit),
             ),
         )
+    return found
+
+
+def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
+    fit = outcome.fit
+    # the published errors are those of one recording
+    published = outcome.published_fit if len(outcome.train) == 1 else None
+    errors = [_side("Training: recordings that were fitted", outcome.train, published)]
+    errors += _validation_sides(outcome.validation, "Validation: recordings that were not fitted")
+    overview, *others = _comparison_pictures(outcome.train, prefixes)
+    pictures = [("Training", tuple(others))] if others else []
+    if outcome.validation:
+        pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
+    parameter_pictures = _parameter_pictures(fit, prefixes)
     branch_tables: tuple[Table, ...] = ()
     branch_pictures: tuple[Picture, ...] = ()
     springs: tuple[Table, ...] = ()
