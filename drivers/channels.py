@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["CHANNEL_NAMES", "HUMIDITY", "RESERVED_NAMES", "Channel", "Scaling"]
+__all__ = ["BAND_ENDINGS", "CHANNEL_NAMES", "HUMIDITY", "RESERVED_NAMES", "Channel", "Scaling"]
 
 #: Built-in channels in the order of a block's rows. Channels that a rig file declares follow them.
 CHANNEL_NAMES = (
@@ -20,8 +20,19 @@ CHANNEL_NAMES = (
 #: Name of a declared channel that is the relative humidity near the film, in per cent.
 HUMIDITY = "relative_humidity"
 
+#: Endings of the names of a prediction's band beside its signal: both ends of 95 %, and the
+#: standard deviations of its parts.
+BAND_ENDINGS = ("low95", "high95", "sd_parameters", "sd_noise", "sd_law")
+
 #: Reserved names: recordings use them otherwise, so a rig file cannot give them to a channel.
-RESERVED_NAMES = (*CHANNEL_NAMES, "time", "displacement_model", "stretch", "nominal_stress")
+RESERVED_NAMES = (
+    *CHANNEL_NAMES,
+    "time",
+    "displacement_model",
+    "stretch",
+    "nominal_stress",
+    *(f"{signal}_{end}" for signal in ("displacement", "nominal_stress") for end in BAND_ENDINGS),
+)
 
 COUNT_MIN, COUNT_MAX = -32768, 32767
 

@@ -13,11 +13,12 @@ from dearig.analysis.readings.record import Readings
 from dearig.config.modelfile import ModelFile, load_model, model_toml
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, load_sequence
+from dearig.drivers.channels import BAND_ENDINGS
 from dearig.errors import InputError
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.stability import pull_in_voltage
 from dearig.model.simulation.strip import Strip
-from dearig.recording.content.layout import BAND_ENDINGS, SIGNALS
+from dearig.recording.content.layout import SIGNALS
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.reading.origin import MODEL

@@ -168,7 +168,15 @@ class _Curves:
 
     def comparison(self, value: Comparison) -> dict[str, Any]:
         told = self.plain(
-            value, "errors", "published", "ended", "warnings", "origin", "channels", "curves"
+            value,
+            "errors",
+            "published",
+            "ended",
+            "warnings",
+            "origin",
+            "channels",
+            "curves",
+            "band",
         )
         # not every number is finite, and JSON has only finite ones
         return told | {

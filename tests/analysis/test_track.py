@@ -256,7 +256,7 @@ class _SecondRunInterrupted(RunObserver):
 def test_an_interrupt_ends_at_zero_and_keeps_what_was_done(tmp_path):
     kept, folder = [], tmp_path / "out"
     with pytest.raises(Interrupted, match="ramped down to 0 V"):
-        followed(folder, iterations=3, ended=kept.append, observer=_SecondRunInterrupted())
+        followed(folder, WRONG, iterations=3, ended=kept.append, observer=_SecondRunInterrupted())
     (outcome,) = kept
     assert outcome.status == "interrupted"
     assert [run.kind for run in outcome.runs] == ["model"]

@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 from dearig.model.effects import EFFECTS
+from dearig.report.text.laws import place_text
 from tests.tools.command import dearig, done, refused
 
 
 def test_the_list_has_every_effect_with_family_and_sentence(tmp_path: Path) -> None:
     answer = done("effects", "--json", tmp_path / "effects.json")
     for effect in EFFECTS.values():
-        line = f"{effect.name} (acts on the {effect.acts_on}): {effect.summary}"
+        line = f"{effect.name} (acts {place_text(effect.acts_on)}): {effect.summary}"
         assert line in answer.out
     told = json.loads((tmp_path / "effects.json").read_text(encoding="utf-8"))
     assert told["format"] == "dearig-effects/1"

@@ -12,6 +12,7 @@ import pytest
 import dearig as api
 from dearig.analysis.readings.scales import scale_errors
 from dearig.recording import open_recording
+from dearig.report.sensed import sense_json
 from tests.tools.command import dearig, done, film_model, refused, thesis_model, write
 
 LOBES = """\
@@ -84,7 +85,7 @@ def test_a_gain_from_one_recording_serves_for_another(folder: Path) -> None:
     result = api.sense(folder / "second.h5", folder / "m.toml", gain=first["gain_by_laser"])
     np.testing.assert_allclose(result.displacement * 1e3, table["displacement_mm"], rtol=1e-9)
     assert result.save(folder / "api.csv").exists()
-    assert result.to_dict()["gain"] == first["gain_by_laser"]
+    assert sense_json(result.outcome)["gain"] == first["gain_by_laser"]
     assert "two standard errors" in result._repr_html_()
 
 

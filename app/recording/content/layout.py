@@ -43,11 +43,11 @@ from types import MappingProxyType
 import h5py
 import numpy as np
 
+from dearig.drivers.channels import BAND_ENDINGS
 from dearig.recording.content.text import fixed, put_text
 
 __all__ = [
     "AVERAGE_COLUMN",
-    "BAND_ENDINGS",
     "ENVIRONMENT_TYPE",
     "EVENT_LEVELS",
     "EVENT_TYPE",
@@ -99,10 +99,6 @@ REQUIRED = MappingProxyType(
         "film": ("time", "stretch", "nominal_stress"),
     }
 )
-
-#: Endings of the names of a prediction's band beside its signal: both ends of 95 %, and the
-#: standard deviations of its parts.
-BAND_ENDINGS = ("low95", "high95", "sd_parameters", "sd_noise", "sd_law")
 
 _BAND_NAMES = {
     "low95": "lower end of the 95 % band",
