@@ -34,7 +34,7 @@ def test_a_line_that_is_not_printed_there_is_stale(shown: str) -> None:
         renewed(shown, PRINTED)
 
 
-@pytest.mark.slow
+@pytest.mark.deep
 def test_the_tutorial_shows_what_its_commands_print(tmp_path: Path) -> None:
     page = list(blocks(PAGE))
     shown = [block for block in page if block.language == "text"]
