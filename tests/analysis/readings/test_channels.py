@@ -25,6 +25,7 @@ def electric(monitor=MONITOR, current=AMPERES, drive="command"):
         current_monitor=current,
         quiet_samples=1000,
         average=1,
+        provenance={},
         channels=(
             SimpleNamespace(name="voltage_monitor", skew=1e-5),
             SimpleNamespace(name="current_monitor", skew=2e-5),
