@@ -1,7 +1,8 @@
-"""Progress of a compilation: the kernels that are ready, of all that the running calls need.
+"""Progress of a compilation: how many kernels are ready, of all that the calls in progress need.
 
-Numba compiles a kernel with all that it calls, and tells its listeners of each. Which those are is
-read from the names that the functions use, so that the total is known before the first is ready.
+Numba compiles a kernel with all kernels that it calls, and sends an event for each. The kernels
+that will be needed are found from the names in the code of each function, so that their number
+is known before the first is ready.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def _is_kernel(function: Dispatcher) -> bool:
 
 
 def _used(function: FunctionType) -> Iterator[object]:
-    """Yield what the names in ``function`` stand for: of its module, of modules in it, closures."""
+    """Yield the values that ``function`` refers to: globals, members of modules, closures."""
     names = _names(function.__code__)
     for cell in function.__closure__ or ():
         yield from _members(cell.cell_contents)

@@ -32,6 +32,7 @@ from dearig.errors import InputError
 from dearig.model.diagnosis.excitation import Excitation, Motion, excitation, range_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.kernel import OK
+from dearig.model.readings.measures import root_mean_square
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import THESIS_AMPLITUDES
 
@@ -135,7 +136,7 @@ def separating_experiment(
             continue
         loaded, waveform, predictions = playable
         apart = {
-            (labels[i], labels[j]): _rms(predictions[i] - predictions[j]) / noise
+            (labels[i], labels[j]): root_mean_square(predictions[i] - predictions[j]) / noise
             for i, j in combinations(range(len(rivals)), 2)
         }
         made.append((name, apart, waveform.duration, loaded.toml))
@@ -295,10 +296,6 @@ def _predictions(
             return None
         found.append(response.displacement)
     return found
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _and(names: Sequence[str]) -> str:

@@ -27,6 +27,7 @@ from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.errors import InputError
 from dearig.model.control import TrackingTask, VoltageLimits, invert, sensitivity_of
 from dearig.model.errors import ModelError
+from dearig.model.readings.measures import root_mean_square
 from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
 from dearig.recording.reading.reader import open_recording
@@ -271,10 +272,10 @@ def measured(
         address=address,
         recording=result.path,
         noise=recording.noise_floor or math.nan,
-        rms=_rms(error[seen]),
+        rms=root_mean_square(error[seen]),
         largest=float(np.abs(error[seen]).max(initial=0.0)),
         settled=settled,
-        settled_rms=_rms(error[later]),
+        settled_rms=root_mean_square(error[later]),
         minutes=_minutes(recording, planned, error, first, rate),
         feedback=result.feedback,
         run=result,
@@ -359,7 +360,3 @@ def _minutes(
         mean = float(seen.mean()) if seen.size else math.nan
         rows.append(((begin + part.size) / rate, mean, corrected))
     return np.array(rows)
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else math.nan

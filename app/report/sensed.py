@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.readings.sense import SenseOutcome
+from dearig.model.readings.channels import GAIN_ERROR
+from dearig.model.readings.measures import root_mean_square
 from dearig.report.text.numbers import significant
 
 __all__ = ["sense_json", "sense_sentences", "sensed_texts"]
@@ -48,7 +50,7 @@ def sense_sentences(outcome: SenseOutcome) -> tuple[str, ...]:
             f"for a film that takes {sensed.scale * 1e6:.3g} uC. {_help(outcome)}",
         )
     known = np.isfinite(sensed.displacement)
-    noise, common = (_rms(e[known]) for e in (sensed.noise_error, sensed.gain_error))
+    noise, common = (root_mean_square(e[known]) for e in (sensed.noise_error, sensed.gain_error))
     least = float(np.min(sensed.standard_error[known]))
     said = [
         f"The standard error is {_um(agreement.error)} RMS ({_um(least)} at best): {_um(noise)} "
@@ -96,8 +98,8 @@ def _scales(outcome: SenseOutcome) -> list[str]:
     ]
     if missing:
         said.append(
-            f"1 % is taken for each scale of which the rig file does not state "
-            f"{' or '.join(missing)}."
+            f"{100.0 * GAIN_ERROR:.2g} % is taken for each scale of which the rig file does not "
+            f"state {' or '.join(missing)}."
         )
     return said
 
@@ -117,10 +119,6 @@ def _help(outcome: SenseOutcome) -> str:
 def _um(length: float) -> str:
     """Return a ``length`` in m as a person reads it, to three digits."""
     return f"{float(f'{length * 1e6:.3g}'):g} um"
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def sense_json(outcome: SenseOutcome) -> dict[str, Any]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Errors", "errors"]
+__all__ = ["Errors", "errors", "root_mean_square"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,11 @@ class Errors:
     samples: int
 
 
+def root_mean_square(values: np.ndarray) -> float:
+    """Return the root of the mean square of ``values``, in their unit; NaN where there are none."""
+    return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
+
+
 def errors(measured: np.ndarray, model: np.ndarray) -> Errors:
     """Errors of ``model`` (N,) against ``measured`` (N,), both in m (or both in Pa).
 
@@ -35,7 +41,7 @@ def errors(measured: np.ndarray, model: np.ndarray) -> Errors:
     meaning for displacements only.
     """
     difference = np.asarray(measured, dtype=np.float64) - np.asarray(model, dtype=np.float64)
-    rms = float(np.sqrt(np.mean(difference**2)))
+    size = root_mean_square(difference)
     largest = float(np.max(np.abs(difference)))
 
     def per_cent(value: float, of: float) -> float:
@@ -44,11 +50,11 @@ def errors(measured: np.ndarray, model: np.ndarray) -> Errors:
         return 0.0 if value == 0.0 else float("inf")
 
     return Errors(
-        rms=rms,
-        nrmse_pct=per_cent(rms, float(np.ptp(measured))),
+        rms=size,
+        nrmse_pct=per_cent(size, float(np.ptp(measured))),
         max=largest,
-        peak_pct=per_cent(rms, float(np.max(np.abs(measured)))),
-        e_rms_thesis_pct=rms * 1e3 * 100.0,
+        peak_pct=per_cent(size, float(np.max(np.abs(measured)))),
+        e_rms_thesis_pct=size * 1e3 * 100.0,
         e_m_thesis_pct=per_cent(largest, float(np.ptp(model))),
         samples=difference.size,
     )

@@ -16,6 +16,7 @@ import numpy as np
 
 from dearig.analysis.cores import for_simulations
 from dearig.config.modelfile import COVARIANCE, PREDICTION, ModelFile
+from dearig.model.readings.measures import root_mean_square
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.strip import Strip
@@ -85,7 +86,7 @@ class PredictionBand:
     @property
     def parameters_rms(self) -> float:
         """The RMS of the part of the parameters over the recording."""
-        return _rms(self.parameters)
+        return root_mean_square(self.parameters)
 
     def inside(self, error: np.ndarray) -> float:
         """Return the share of the readings whose ``error`` (N,) is inside; NaN is no reading."""
@@ -138,14 +139,10 @@ def _law_error(comparisons: Sequence[Comparison], noise: float) -> float:
     for c in comparisons:
         explained = max(c.noise or 0.0, noise) ** 2
         explained += 0.0 if c.band is None else c.band.parameters_rms**2
-        response = _rms(c.model)
+        response = root_mean_square(c.model)
         if math.isfinite(c.errors.rms) and response > 0.0:
             squares.append(max(c.errors.rms**2 - explained, 0.0) / response**2)
     return math.sqrt(sum(squares) / len(squares)) if squares else 0.0
-
-
-def _rms(response: np.ndarray) -> float:
-    return math.sqrt(float(np.mean(response**2)))
 
 
 def motion_of(comparison: Comparison, noise: float) -> Motion:
@@ -293,7 +290,7 @@ def _band(
     return PredictionBand(
         parameters,
         known.noise,
-        known.law * _rms(response),
+        known.law * root_mean_square(response),
         known.law_of,
         known.law_from,
         beyond=beyond,

@@ -14,6 +14,7 @@ from dearig.config.modelfile import ModelFile, load_model
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.readings.channels import CURRENT
+from dearig.model.readings.measures import root_mean_square
 from dearig.model.readings.sensing import SHARES, Sensed, sense_displacement
 from dearig.model.simulation.actuator import Actuator
 from dearig.recording.files import check_output, replaced_when_done
@@ -157,17 +158,13 @@ def _agreement(sensed: Sensed, laser: np.ndarray, gain: float) -> Agreement | No
     means = [np.average(asked[lobes == n], weights=weight[lobes == n]) for n in np.unique(lobes)]
     scatter = float(np.std(means, ddof=1) / math.sqrt(len(means))) if len(means) > 2 else None
     return Agreement(
-        rms=_rms(difference),
-        error=_rms(error),
+        rms=root_mean_square(difference),
+        error=root_mean_square(error),
         coverage=float(np.mean(np.abs(difference) <= 2.0 * error)),
         gain=gain * math.exp(change),
         gain_error=scatter,
-        rms_with_gain=_rms(difference - change * gradient),
+        rms_with_gain=root_mean_square(difference - change * gradient),
     )
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _advised(opened: Recording) -> int:
