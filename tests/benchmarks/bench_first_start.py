@@ -31,6 +31,7 @@ def first_plot(preview: bool) -> None:
     from dearig.window.sequence.planner import Planner
     from dearig.window.session.state import Session
     from dearig.window.shell.frame import MainWindow
+    from tests.window.real_window import end
 
     class Painted(QObject):
         def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
@@ -51,7 +52,7 @@ def first_plot(preview: bool) -> None:
             window.show()
             application.exec()
         print("painted", flush=True)
-        window.leave()
+        end(window)
 
 
 def seconds(preview: bool) -> float:
