@@ -2,7 +2,7 @@
 
 ``python -m tests.benchmarks.bench_first_start [--pairs 2]``: each start is a process of its own,
 with an empty folder for compiled kernels, from its begin to the first painted curve of the plan. In
-turns with the preview by kernels that are not compiled, and without it, when the plan waits for the
+turns with the preview that needs no compiled kernel, and without it, when the plan waits for the
 compilation. Both pay the same imports, and the compilation goes on in both.
 """
 
