@@ -535,6 +535,7 @@ class _Run:
             self._note(at, "fault", acted.sentence)
         state = after_run(rig, self._last, failed=failure is not None)
         self._show_output(state)
+        state = self.output_state  # with the time that was shown
         event = Event(at, _LEVELS[state.known], f"output: {state.sentence}")
         if played and state.confirmed:
             self._event_log.add(event)  # the recording has it as attributes

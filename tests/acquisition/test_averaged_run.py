@@ -27,6 +27,7 @@ from dearig.recording import open_recording
 from dearig.sim_backend.card import Converters
 from dearig.sim_backend.streams import Streams
 from tests.acquisition.test_replay import counts, same
+from tests.deep import mostly_deep
 from tests.tools.command import LOBE, done, write
 from tests.tools.daqmx import Served, served
 
@@ -64,7 +65,7 @@ def test_the_drive_is_computed_at_the_rate_of_conversions() -> None:
     assert averaged.admitted().digest == fast.admitted().digest
 
 
-@pytest.mark.parametrize("block", [1, 7, 333])
+@pytest.mark.parametrize("block", mostly_deep([1, 7, 333], [7]))
 def test_blocks_that_cut_rows_change_nothing(
     runs: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int
 ) -> None:

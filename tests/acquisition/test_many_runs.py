@@ -58,7 +58,7 @@ def one_run(number: int, folder: Path) -> str:
     return result.outcome
 
 
-@pytest.mark.slow
+@pytest.mark.deep
 def test_nothing_grows_in_a_hundred_runs(tmp_path: Path) -> None:
     process = psutil.Process()
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import pytest
@@ -198,7 +200,11 @@ def test_a_fault_of_the_instrument_makes_the_output_unknown_at_once(run) -> None
     assert [state.known for state in states] == [Known.UNKNOWN, Known.COMMANDED]
 
 
-def test_the_operator_need_not_wait_for_the_guardian(run, tmp_path: Path) -> None:
+def test_the_operator_need_not_wait_for_the_guardian(
+    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hours = itertools.count(0.0, 3600.0)  # another time at each look
+    monkeypatch.setattr("dearig.acquisition.output.time", SimpleNamespace(time=hours.__next__))
     interrupts = Interrupts()
     rig = Unreachable([])
     wait = rig.await_guardian
@@ -208,7 +214,10 @@ def test_the_operator_need_not_wait_for_the_guardian(run, tmp_path: Path) -> Non
         return wait(within)
 
     rig.await_guardian = impatient  # type: ignore[method-assign]
-    ended, _ = run(rig, interrupts=interrupts)
+    ended, states = run(rig, interrupts=interrupts)
     assert isinstance(ended, NotSafe)
     assert rig.polls == 2
     assert attributes(tmp_path)["output_state"] == "unknown"
+    # unknown since one moment, wherever it is told
+    assert {state.at for state in states} == {ended.output_state.at}
+    assert f"fault: output: {ended.output_state.sentence}" in messages(tmp_path)

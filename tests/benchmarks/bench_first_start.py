@@ -2,7 +2,7 @@
 
 ``python -m tests.benchmarks.bench_first_start [--pairs 2]``: each start is a process of its own,
 with an empty folder for compiled kernels, from its begin to the first painted curve of the plan. In
-turns with the preview by kernels that are not compiled, and without it, when the plan waits for the
+turns with the preview that needs no compiled kernel, and without it, when the plan waits for the
 compilation. Both pay the same imports, and the compilation goes on in both.
 """
 
@@ -31,6 +31,7 @@ def first_plot(preview: bool) -> None:
     from dearig.window.sequence.planner import Planner
     from dearig.window.session.state import Session
     from dearig.window.shell.frame import MainWindow
+    from tests.window.real_window import end
 
     class Painted(QObject):
         def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
@@ -51,7 +52,7 @@ def first_plot(preview: bool) -> None:
             window.show()
             application.exec()
         print("painted", flush=True)
-        window.leave()
+        end(window)
 
 
 def seconds(preview: bool) -> float:

@@ -312,7 +312,7 @@ def test_results_of_other_sources_are_not_mixed_in(
     assert bench.kept(Case(7, "thesis"), any_sources=True) == there
 
 
-@pytest.mark.slow
+@pytest.mark.deep
 def test_one_case_from_end_to_end(tmp_path: Path) -> None:
     """A film that hides nothing: the rig's seed goes in, a score comes out."""
     case = Case(clean_seeds(1)[0], "thesis")

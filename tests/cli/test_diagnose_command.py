@@ -340,7 +340,7 @@ class TestRig:
                     "validation-b-7.0", Interrupted("ramped down"), 130, True, id="interrupted"
                 ),
             ],
-            kept=["trip", "interrupted"],
+            kept=["trip"],
         ),
     )
     def test_what_ends_a_run_loses_nothing_of_what_was_found(

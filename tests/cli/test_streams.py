@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from dearig.recording import open_recording
+from tests.deep import mostly_deep
 from tests.tools.command import LOBE, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="shells of POSIX")
@@ -29,7 +30,7 @@ def shell(streams: str, *arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="no /dev/full")
-@pytest.mark.parametrize("streams", STREAMS)
+@pytest.mark.parametrize("streams", mostly_deep(STREAMS, ["2>&-", ">/dev/full 2>/dev/full"]))
 def test_an_arc_ends_with_its_code_without_any_stream(tmp_path: Path, streams: str) -> None:
     lobe, out = write(tmp_path / "lobe.toml", LOBE), tmp_path / "run.h5"
     ended = shell(streams, "record", lobe, *ARC, "--out", out)

@@ -10,7 +10,7 @@ from tests.tools.command import done
 from tests.tools.recordings import measured_data
 
 
-@pytest.mark.slow
+@pytest.mark.deep
 def test_a_strip_hangs_slack(tmp_path):
     names = {
         "cycle-fast": "vhb4910_cycle_rate0.05_stretch2.0.csv",

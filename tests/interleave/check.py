@@ -54,7 +54,7 @@ def _outputs(folder: Path, ended: list[Ended]) -> Iterator[str]:
         if one.code not in ALLOWED and not killed:
             yield f"{who} ended with {one.code}: {one.said[-300:]}"
         if "Traceback" in one.said or "unexpected" in one.said or "hung" in one.said:
-            yield f"{who}: {one.said[-600:]}"
+            yield f"{who}: {one.said[-4000:]}"
         if "by now" in one.said or "damaged" in one.said or "WRONG" in one.said:
             yield f"{who} met a file that another command had harmed: {one.said[-300:]}"
 

@@ -5,6 +5,7 @@ The parent has imported everything and compiled the kernels; a fork of it starts
 
 from __future__ import annotations
 
+import faulthandler
 import gc
 import heapq
 import json
@@ -41,7 +42,8 @@ NAMES, FIRST = ("a.h5", "b.h5"), 0.7
 KINDS = ("record", "recover", "export", "import", "index", "verify", "force")
 #: Mean time in s between two starts; parts of the commands that are killed or stopped, and when.
 GAP, KILLED, STOPPED, WITHIN = 0.04, 0.25, 0.25, 0.5
-#: s until a case counts as hung.
+#: s without processor time, or of it, after which a command counts as hung. On a busy computer a
+#: command that works may take minutes.
 HUNG = 120.0
 
 
@@ -151,13 +153,19 @@ def play(commands: list[Command], folder: Path, notes: Path) -> list[Ended]:
     began = time.monotonic()
     due = [(command.start, n, 0) for n, command in enumerate(commands)]  # signal 0: start
     found = [Ended(command) for command in commands]
+    hung: set[int] = set()
     alive: dict[int, tuple[int, int]] = {}  # descriptor of a process: its number, its command
+    worked: dict[int, tuple[float, float]] = {}  # its processor time in s, and since when
     while due or alive:
         now = time.monotonic() - began
-        if now > HUNG:
-            for pid, _ in alive.values():
-                os.kill(pid, signal.SIGKILL)
-        wait = max(due[0][0] - now, 0.0) if due else max(HUNG - now, 1.0)
+        for pid, n in alive.values():
+            used = _processor_time(pid)
+            if used != worked.get(pid, (0.0, 0.0))[0]:
+                worked[pid] = used, now
+            if used > HUNG or now - worked.setdefault(pid, (used, now))[1] > HUNG:
+                hung.add(n)
+                os.kill(pid, signal.SIGABRT)  # it tells where each of its threads is
+        wait = max(due[0][0] - now, 0.0) if due else 1.0
         for fd in select.select(list(alive), [], [], wait)[0]:
             pid, n = alive.pop(fd)
             found[n].code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
@@ -178,9 +186,15 @@ def play(commands: list[Command], folder: Path, notes: Path) -> list[Ended]:
         said = notes / f"{n}.txt"  # missing where it was killed at once
         ended.said = said.read_text("utf-8", "replace") if said.exists() else ""
         ended.runs = _runs(notes / f"{n}.runs")
-        if ended.ended > HUNG:
+        if n in hung:
             ended.said += f"\nhung for {HUNG:g} s"
     return found
+
+
+def _processor_time(pid: int) -> float:
+    """Return the processor time of a process in s; it may have ended, and was not waited for."""
+    fields = Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _runs(path: Path) -> dict[str, tuple[int, bool]]:
@@ -200,6 +214,7 @@ def _start(command: Command, folder: Path, note: Path) -> int:
         out = os.open(f"{note}.txt", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
         os.dup2(out, 1)
         os.dup2(out, 2)
+        faulthandler.enable(out)
         sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
         sys.stderr = os.fdopen(2, "w", encoding="utf-8", closefd=False)
         os.chdir(folder)

@@ -16,6 +16,7 @@ from dearig.drivers.rig import Block
 from dearig.recording import open_recording, recover, verify
 from dearig.recording.content.layout import NUMBERED
 from dearig.recording.content.text import fixed
+from tests.deep import mostly_deep
 from tests.tools.recordings import run_counts, write_run, writer
 
 SAMPLES = Path(__file__).parents[2] / "recordings"
@@ -83,8 +84,8 @@ def packages_of(engine: str | None) -> tuple[str, ...]:
     return ("xarray", "h5netcdf" if engine == "h5netcdf" else "netCDF4")
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("group", ["entry/data", "entry"])
+@pytest.mark.parametrize("engine", mostly_deep(ENGINES, [None]))
+@pytest.mark.parametrize("group", mostly_deep(["entry/data", "entry"], ["entry"]))
 def test_xarray_opens_it_with_each_engine(run: Path, engine: str | None, group: str) -> None:
     script = XARRAY.format(group=group, engine=engine)
     sizes, time = read_in(packages_of(engine), script, run)
@@ -93,7 +94,7 @@ def test_xarray_opens_it_with_each_engine(run: Path, engine: str | None, group: 
     assert not [name for name in sizes if name.startswith("phony")]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", mostly_deep(ENGINES, [None]))
 def test_xarray_opens_it_as_a_tree(run: Path, engine: str | None) -> None:
     found = read_in(packages_of(engine), TREE.format(engine=engine), run)
     assert found == open_recording(run).displacement.tolist()

@@ -67,7 +67,8 @@ DEEP = {
     "JSON of 1,000,000 objects", "80,000 channels", "100,000 tables", "2 MB of line ends",
     "2 MB of quotation marks", "200,000 levels", "a key of 1 MB", "a kind of 1 MB",
     "900 brackets", "a header of 100,000 parts", "tables in tables", "10,000 effects",
-    "CSV of line ends", "CSV of quotation marks", "rig file of 50 MB",
+    "CSV of line ends", "CSV of quotation marks", "rig file of 50 MB", "10,000 segments",
+    "JSON of 1,000,000 names", "CSV of 10,000,000 lines of names",
 }  # fmt: skip
 
 

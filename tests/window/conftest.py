@@ -157,8 +157,12 @@ def keep(qtbot: QtBot) -> Iterator[Callable[[QWidget], None]]:
 
 @pytest.fixture
 def window(session: Session, keep: Callable[[QWidget], None], qtbot: QtBot) -> MainWindow:
-    """The whole window with its first plan made; its simulated rig does not take its time."""
+    """The whole window with its first plan made; its simulated rig does not take its time.
+
+    A page is made when it is opened, not before the rig is armed: all pages are two seconds.
+    """
     shown = MainWindow(session)
+    shown.idle_pages.close()
     shown.resize(1366, 768)
     keep(shown)
     qtbot.waitUntil(lambda: session.preview is not None, timeout=120_000)

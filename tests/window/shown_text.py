@@ -28,7 +28,17 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-__all__ = ["commands", "cut_off", "overlapping", "rendered_markup", "shown_texts", "unreadable"]
+from dearig.window.kit.widgets import Message
+
+__all__ = [
+    "commands",
+    "cut_off",
+    "overlapping",
+    "rendered_markup",
+    "shown_texts",
+    "stretched",
+    "unreadable",
+]
 
 #: Names of keys with their units, which are for files, and signs that stand in for others.
 _RAW = re.compile(
@@ -158,6 +168,18 @@ def overlapping(window: QWidget) -> list[str]:
             if min(common.width(), common.height()) > 1 and not one.isAncestorOf(other):
                 found.append(f"{_named(one)} over {_named(other)}")
     return found
+
+
+def stretched(window: QWidget) -> list[str]:
+    """Return the messages that take the room of others: more than a line above their own need."""
+    lay_out()
+    return [
+        f"{_named(message)}: {message.height()} px for {message.heightForWidth(message.width())}"
+        for message in window.findChildren(Message)
+        if message.isVisible()
+        and message.height()
+        > message.heightForWidth(message.width()) + message.fontMetrics().lineSpacing()
+    ]
 
 
 def _named(widget: QWidget) -> str:

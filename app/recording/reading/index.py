@@ -26,7 +26,7 @@ from dearig.recording.content.pyramid import reduced
 from dearig.recording.content.safe import Refused, dataset, group, item
 from dearig.recording.content.text import text_of
 from dearig.recording.content.timestamps import local_time
-from dearig.recording.files import in_words, replaced_when_done
+from dearig.recording.files import in_words, journal_of, replaced_when_done
 from dearig.recording.reading.environment import stored_means
 from dearig.recording.reading.opening import UNREADABLE, identifier_of, read_from
 from dearig.recording.reading.reader import read_events
@@ -234,8 +234,11 @@ def glance(path: Path, name: str, size: int) -> Entry:
     try:
         return read_from(path, lambda file: _entry(path, file, name, size))
     except InputError as error:
-        # HDF5 raises them for the errors of the disk
-        passing = isinstance(error.__cause__, OSError | MemoryError | RuntimeError)
+        # HDF5 raises them for the errors of the disk; a journal may be gone at the next look, which
+        # the recording itself does not show
+        passing = isinstance(
+            error.__cause__, OSError | MemoryError | RuntimeError
+        ) or os.path.lexists(journal_of(path))
         return Entry(name, size, trouble=str(error), passing=passing)
 
 

@@ -245,8 +245,6 @@ def style_plot(plot: pg.PlotItem, theme: Theme) -> None:
         axis.setTickPen(pg.mkPen(QColor(theme.raised)))
         axis.setStyle(maxTickLevel=0, tickAlpha=255)
         axis.setZValue(-1000)
-        if axis.autoSIPrefix:  # switching it off twice would scale the axis again
-            axis.enableAutoSIPrefix(False)  # the labels have fixed units: kV, mm
     plot.getAxis("left").setWidth(64)
     plot.setMenuEnabled(False)
     plot.hideButtons()

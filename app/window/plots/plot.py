@@ -97,6 +97,9 @@ class Plot(pg.PlotItem):
         }
         if dates:
             axes["bottom"] = pg.DateAxisItem("bottom")
+        for axis in axes.values():
+            if axis.autoSIPrefix:  # switching it off twice would scale the axis again
+                axis.enableAutoSIPrefix(False)  # the labels have fixed units: kV, mm
         view = pg.ViewBox(enableMenu=False)
         super().__init__(viewBox=view, axisItems=axes, enableMenu=False)
         self.log = log

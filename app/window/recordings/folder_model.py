@@ -31,7 +31,7 @@ from dearig.units import SHOWN
 from dearig.window.kit.widgets import plain_tip
 from dearig.window.session.state import Session
 
-__all__ = ["COLUMNS", "PATH", "SUMMARY", "FolderModel", "ListColumn", "ThumbnailDelegate"]
+__all__ = ["COLUMNS", "ENDED", "PATH", "SUMMARY", "FolderModel", "ListColumn", "ThumbnailDelegate"]
 
 _Index = QModelIndex | QPersistentModelIndex
 
@@ -154,7 +154,7 @@ COLUMNS = (
     *(_text_column(key) for key, field in TEXTS.items() if not field.shown),
 )  # fmt: skip
 _HEADS = tuple(column.head for column in COLUMNS)
-_NAME, _START, _ENDED = (_HEADS.index(head) for head in ("Recording", "Start", "How it ended"))
+_NAME, _START, ENDED = (_HEADS.index(head) for head in ("Recording", "Start", "How it ended"))
 
 
 class FolderModel(QAbstractTableModel):
@@ -271,7 +271,7 @@ class FolderModel(QAbstractTableModel):
             return plain_tip(_tip(path, summary, column))
         if role == Qt.ItemDataRole.TextAlignmentRole and COLUMNS[column].number:
             return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        if role == Qt.ItemDataRole.ForegroundRole and column == _ENDED and summary is not None:
+        if role == Qt.ItemDataRole.ForegroundRole and column == ENDED and summary is not None:
             theme, level = self._session.theme, how_it_ended(summary)[0]
             colour = {"fault": theme.bad, "warning": theme.warn}.get(level)
             return None if colour is None else QColor(colour)
@@ -279,7 +279,7 @@ class FolderModel(QAbstractTableModel):
 
     def _text(self, path: Path, summary: RecordingSummary | None, column: int) -> str:
         if summary is None:
-            return path.stem if column == _NAME else "…" if column == _ENDED else ""
+            return path.stem if column == _NAME else "…" if column == ENDED else ""
         if column == _START and not summary.started:
             return local_time(datetime.fromtimestamp(self._files[path][0], UTC).isoformat())
         return COLUMNS[column].text(summary)
@@ -297,7 +297,7 @@ class FolderModel(QAbstractTableModel):
         summary = self._summaries.get(path)
         if self._column == _START:
             return self._started(path, summary)
-        if summary is None or (summary.trouble and self._column not in (0, _NAME, _ENDED)):
+        if summary is None or (summary.trouble and self._column not in (0, _NAME, ENDED)):
             return path.stem.casefold() if self._column in (0, _NAME) else None
         column = COLUMNS[self._column]
         if column.key is not None:
@@ -355,7 +355,7 @@ def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
         if summary.fitted:
             return "The model was fitted to this recording; this error is no validation"
         return COLUMNS[column].tip
-    if column == _ENDED:
+    if column == ENDED:
         told = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in summary.events]
         return "\n".join([summary.outcome, *told])
     if COLUMNS[column].wide and head not in ("Recording", "Notes"):

@@ -9,6 +9,7 @@ from PySide6.QtCore import (
     QItemSelection,
     QItemSelectionModel,
     QModelIndex,
+    QPersistentModelIndex,
     QPoint,
     QSignalBlocker,
     Qt,
@@ -16,10 +17,19 @@ from PySide6.QtCore import (
     Slot,
 )
 from PySide6.QtGui import QAction, QResizeEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QTableView, QWidget
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QMenu,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+    QWidget,
+)
 
 from dearig.window.recordings.folder_model import (
     COLUMNS,
+    ENDED,
     FolderModel,
     ThumbnailDelegate,
     shown_columns,
@@ -36,6 +46,16 @@ _SHOWN, _WIDTHS, _SORTING = (
 _START = "Start"
 #: Least width of a column: its sorting sign, and room to take hold of its edge.
 _WIDTH_MIN, _WIDTH_MAX = 40, 1200
+
+
+class _SentenceDelegate(QStyledItemDelegate):
+    """Cuts sentences at their end: the middle of "ended early: ... by hand" is what happened."""
+
+    def initStyleOption(  # noqa: N802
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> None:
+        super().initStyleOption(option, index)
+        option.textElideMode = Qt.TextElideMode.ElideRight
 
 
 class RecordingsTable(QTableView):
@@ -65,6 +85,7 @@ class RecordingsTable(QTableView):
         self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setItemDelegateForColumn(0, ThumbnailDelegate(session))
+        self.setItemDelegateForColumn(ENDED, _SentenceDelegate(self))
         self.verticalHeader().hide()
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(32)

@@ -415,9 +415,10 @@ class RigPage(Page):
         self.findings.setTabKeyNavigation(False)
         self.findings.setAccessibleName("Results of the check")
         header = self.findings.horizontalHeader()
-        for i in (0, 2):
-            header.setSectionResizeMode(i, QHeaderView.ResizeMode.ResizeToContents)
-        header.resizeSection(1, 120)  # px; the tooltip has the whole name
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        # px; both wrap, since the result needs the room most
+        header.resizeSection(1, 120)
+        header.resizeSection(2, 170)
         header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
         self.findings.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         results.addWidget(self.findings, 1)

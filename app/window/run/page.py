@@ -340,7 +340,12 @@ class RunPage(Page):
         self.hold_state = Message()
         right.addWidget(self.hold_state)
         right.addWidget(self.display, 1)
-        right.addLayout(self._end_row())
+        # each in the column itself: a layout of its own that has only a wrapped text in it asks for
+        # the height of that text at its narrowest
+        self.watchdog = Message()
+        right.addWidget(self.watchdog)
+        right.addLayout(self._plan_row())
+        right.addLayout(self._result_row())
         outer.addLayout(right, 1)
 
     def _connect(self) -> None:
@@ -400,18 +405,16 @@ class RunPage(Page):
         row.addStretch(1)
         return row
 
-    def _end_row(self) -> QVBoxLayout:
-        column = QVBoxLayout()
-        column.setSpacing(SPACE // 2)
+    def _plan_row(self) -> QHBoxLayout:
         row = QHBoxLayout()
         self.plan = Message()
-        self.watchdog = Message()
-        column.addWidget(self.watchdog)
         self.to_sequence = button("Edit the &sequence", "Go to the Sequence page")
         self.to_sequence.clicked.connect(lambda: self.go_to.emit("Sequence"))
         row.addWidget(self.plan, 1)
         row.addWidget(self.to_sequence)
-        column.addLayout(row)
+        return row
+
+    def _result_row(self) -> QHBoxLayout:
         row = QHBoxLayout()
         self.result = Message()
         self.show_button = button("Show the &recording", "Go to the Recordings page")
@@ -425,8 +428,7 @@ class RunPage(Page):
         row.addWidget(self.result, 1)
         row.addWidget(self.show_button)
         row.addWidget(self.follow_button)
-        column.addLayout(row)
-        return column
+        return row
 
 
 def _end_level(end: RunEnd) -> str:

@@ -25,13 +25,15 @@ from dearig.window.session.state import Breach, Preview, Session
 
 __all__ = ["Planner", "make_preview"]
 
+_PIECE = 1 << 16  # samples of the voltage that are computed at once
 _BREACHES_MAX = 50  # time spans marked in one plot; more are drawn as one
 
 
 class Planner(QObject):
     """Keeps ``session.preview`` up to date with the sequence, the rig file and the film.
 
-    While the model is compiled, an outline by kernels that are not is made in another process.
+    While the model is compiled, an outline by kernels that are not is made in another process. That
+    takes seconds on a first start; until then the voltage alone is shown, which needs no kernel.
     A plan that is no longer wanted ends at its next piece. ``progressed`` carries the part of the
     present plan that is done, 0 to 1.
     """
@@ -58,6 +60,11 @@ class Planner(QObject):
             self._outline()
             return
         toml, folder, rig_file, film = s.sequence_toml, s.sequence_folder, s.rig_file, s.film
+        progress = self._next_plan()
+        self._background.start(lambda: make_preview(toml, folder, rig_file, film, progress))
+
+    def _next_plan(self) -> Progress:
+        """Begin another plan; return what ends it where it is no longer wanted."""
         self._wanted = number = self._wanted + 1
 
         def progress(stage: str, part: float) -> None:  # noqa: ARG001
@@ -65,7 +72,7 @@ class Planner(QObject):
                 raise Interrupted("another plan is asked for")
             self.progressed.emit(part)
 
-        self._background.start(lambda: make_preview(toml, folder, rig_file, film, progress))
+        return progress
 
     @Slot(bool)
     def hold(self, held: bool) -> None:
@@ -85,23 +92,56 @@ class Planner(QObject):
 
     def _outline(self) -> None:
         s = self._session
-        self._wanted = number = self._wanted + 1
+        toml, folder, rig_file = s.sequence_toml, s.sequence_folder, s.rig_file
+        progress, number = self._next_plan(), self._wanted
         s.set_outline(None)  # it was that of another sequence
+        self._background.start(lambda: outline_voltage(toml, folder, rig_file, progress))
         self._outlines.clear()
         self._outline_job = job = self._outlines.submit(
             outline, s.sequence_toml, str(s.sequence_folder), s.rig_text
         )
 
         def take(found: Preview | None) -> None:
-            if self._held and number == self._wanted:
+            if self._held and number == self._wanted and found is not None:
                 s.set_outline(found)
 
         job.finished.connect(take)
 
     @Slot(object)
-    def _done(self, preview: Preview) -> None:
-        if not self._held:  # one that was begun before is made again
-            self._session.set_preview(preview)
+    def _done(self, preview: Preview | None) -> None:
+        session = self._session
+        if preview is None or preview.is_outline:
+            # the other process may have been faster
+            if self._held and preview is not None and session.outline is None:
+                session.set_outline(preview)
+        elif not self._held:  # one that was begun before is made again
+            session.set_preview(preview)
+
+
+def outline_voltage(
+    toml: str, folder: Path, rig_file: RigFile, progress: Progress = quiet
+) -> Preview | None:
+    """Return the voltage of the sequence ``toml`` as an outline, without what the model predicts.
+
+    None where it cannot be played at all.
+    """
+    rate, nothing = rig_file.card.conversion_rate_Hz, np.empty(0)
+    loaded, faults = read_sequence(toml, "the sequence", folder)
+    if loaded is None or faults or loaded.clock_faults(rate):
+        return None
+    samples = loaded.on_clock(rate)
+    voltage = Pyramid(samples.samples)
+    for start in range(0, samples.samples, _PIECE):
+        progress("voltage", start / samples.samples)
+        voltage.push(samples.window(start, min(start + _PIECE, samples.samples)))
+    return Preview(
+        toml,
+        sentence=loaded.sequence.name,
+        curves={"voltage": _curve(voltage, rate)}
+        | dict.fromkeys(("displacement", "field"), (nothing, nothing)),
+        segments=_segments(loaded, (samples.samples - 1) / rate),
+        is_outline=True,
+    )
 
 
 def make_preview(

@@ -70,6 +70,8 @@ class PreviewPlots(PlotArea):
             words = ""
             if preview is not None and not planned:
                 words = "no prediction: the sequence cannot be played"
+            elif planned and not y.size:
+                words = "the prediction follows"
             elif y.size and not np.isfinite(y).any():
                 words = "no prediction: a limit is already exceeded"
             elif not np.isfinite(y).all():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeVar, cast
 
-from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPoint, QSize, Qt, QTimer, Slot
+from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Slot
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
@@ -15,10 +15,7 @@ from PySide6.QtGui import (
     QShowEvent,
 )
 from PySide6.QtWidgets import (
-    QAbstractSlider,
-    QAbstractSpinBox,
     QApplication,
-    QComboBox,
     QFrame,
     QHBoxLayout,
     QListWidget,
@@ -26,10 +23,8 @@ from PySide6.QtWidgets import (
     QMenu,
     QMessageBox,
     QScrollArea,
-    QScrollBar,
     QStackedWidget,
     QStyle,
-    QTabBar,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -42,6 +37,7 @@ from dearig.window.documents.questions import may_close, offer_unsaved
 from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.stop_keys import StopKeys
 from dearig.window.kit.theme import DARK, LIGHT, SPACE, apply, system_theme
+from dearig.window.kit.wheel_guard import WheelGuard
 from dearig.window.kit.widgets import ElidedLabel
 from dearig.window.recordings.library import shared_library
 from dearig.window.recordings.page import RecordingsPage
@@ -61,7 +57,7 @@ from dearig.window.shell.guide import Guide
 from dearig.window.shell.idle_pages import IdlePages
 from dearig.window.shell.pages import PAGES
 
-__all__ = ["MainWindow", "WheelGuard"]
+__all__ = ["MainWindow"]
 
 _COLOUR_SCHEMES = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
 _SETTLING = 1000  # ms after the window is shown in which a window manager gives it its frame
@@ -75,7 +71,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.session = session
         self.setWindowTitle("dearig[*]")  # Qt shows a mark there while something is not saved
-        self.wheel_guard = WheelGuard(self)  # before any field is shown
+        self.wheel_guard = WheelGuard(self)
         self.planner = Planner(session, self)
         self.compilation = Compilation(self)
         self.library = shared_library(session)  # lists the folder while the window is made
@@ -490,38 +486,3 @@ def _scrollable(pages: QWidget) -> QScrollArea:
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     area.setWidget(pages)
     return area
-
-
-_FIELDS = (QAbstractSpinBox, QComboBox, QAbstractSlider, QTabBar)
-
-
-class WheelGuard(QObject):
-    """Keeps the wheel from every field of the program that does not have the focus.
-
-    Fields are spin boxes, lists, sliders and tab bars, in the windows and dialogs that are shown
-    while the guard exists. What surrounds the field scrolls instead. Qt's own rule, by which the
-    wheel gives the focus to the field under the pointer, is switched off: limits and interlocks
-    would be changed by a turn of the wheel.
-    """
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
-        application = QCoreApplication.instance()
-        if application is not None:
-            application.installEventFilter(self)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
-        kind = event.type()
-        if kind == QEvent.Type.Wheel:
-            if isinstance(watched, _FIELDS) and not _scrolls(watched) and not watched.hasFocus():
-                event.ignore()  # it goes on to the parents of the field
-                return True
-        elif kind == QEvent.Type.Polish and isinstance(watched, _FIELDS):
-            policy = watched.focusPolicy()
-            if policy == Qt.FocusPolicy.WheelFocus:
-                watched.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        return False
-
-
-def _scrolls(watched: QObject) -> bool:
-    return isinstance(watched, QScrollBar)

@@ -194,6 +194,7 @@ def test_prior_that_the_data_contradict_is_said():
     assert free().prior_p is None
 
 
+@pytest.mark.deep
 def test_p_of_priors_is_uniform_where_they_are_true():
     rng = np.random.default_rng(5)
     found = []

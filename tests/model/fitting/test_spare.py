@@ -13,6 +13,7 @@ from dearig.model.fitting import Estimate, Identification, identify
 from dearig.report.as_json import outcome_json
 from dearig.report.text.estimates import estimate_table
 from dearig.report.text.tables import parameter_table
+from tests.deep import mostly_deep
 from tests.tools.diagnosis import stage
 from tests.tools.engine import PLAIN, record_of, thesis_drive
 from tests.tools.reports import fit as paper_fit
@@ -30,7 +31,7 @@ def fit_of_twins(seed: int) -> Identification:
     return identify([record_of(TWINS, thesis_drive(rate=100.0), seed=seed)], base)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", mostly_deep(SEEDS, [SEEDS[0]]))
 def test_no_part_of_a_sum_has_an_interval_without_the_truth(seed: int) -> None:
     truth = {"mu_0": 50e3, "mu_1": 46.84e3, "mu_2": 57.67e3, "T_1": 0.462, "T_2": 0.470}
     for e in fit_of_twins(seed).estimates:

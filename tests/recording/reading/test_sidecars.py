@@ -103,6 +103,10 @@ def test_a_planted_journal_spoils_no_folder(
         for reads in (open_recording, recover):
             with pytest.raises(InputError, match=r"first\.h5\.journal is a"):
                 reads(victim)
+        # once it is gone, nothing of it is remembered
+        journal_of(victim).rename(tmp_path / "gone")
+        again = index_folder(tmp_path, cache=tmp_path / "cache")
+        assert [entry.trouble for entry in again] == ["", ""]
     else:
         assert not entries["first.h5"].trouble
         assert whole_journal(victim) is None

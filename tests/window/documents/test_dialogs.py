@@ -15,6 +15,7 @@ import dearig.window
 from dearig.window.documents import dialogs
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from tests.deep import mostly_deep
 from tests.window.conftest import press
 
 LEFT = Qt.MouseButton.LeftButton
@@ -33,7 +34,7 @@ def opened() -> QDialog | None:
     return next((w for w in shown if w.isVisible()), None)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", mostly_deep(KINDS, ["save_as", "ask", "ask_text"]))
 def test_stop_works_beside_an_open_dialog(
     qtbot: QtBot, quick_ramp: Session, window: MainWindow, kind: str
 ) -> None:
@@ -65,7 +66,7 @@ def test_stop_works_beside_an_open_dialog(
     assert saw == ["RAMPING"]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", mostly_deep(KINDS, ["choose_file"]))
 def test_nothing_is_armed_while_a_dialog_waits_for_its_answer(
     qtbot: QtBot, window: MainWindow, kind: str
 ) -> None:

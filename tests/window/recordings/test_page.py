@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QStyleOptionViewItem, QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.config.modelfile import save_model
@@ -173,6 +173,12 @@ def test_what_is_broken_is_said_and_what_can_be_mended_is_mended(session, keep, 
     assert cells(page, "How it ended") == {
         "torn": "! killed, or still running", "letter": "✕ is not an HDF5 file",
     }  # fmt: skip
+    for column, cut in (("How it ended", "Right"), ("Recording", "Middle")):  # sentences, and names
+        index = page.table.model().index(0, [c.head for c in COLUMNS].index(column))
+        option = QStyleOptionViewItem()
+        page.table.initViewItemOption(option)
+        page.table.itemDelegateForIndex(index).initStyleOption(option, index)
+        assert option.textElideMode.name == f"Elide{cut}"
     page.choose([session.folder / "letter.h5"])
     qtbot.waitUntil(lambda: "is not an HDF5 file" in page.message.text(), timeout=_PATIENCE)
     assert page.plot.shown == ()

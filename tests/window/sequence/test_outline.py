@@ -32,14 +32,27 @@ def planner(session: Session, keep: Callable[[QWidget], None]):
     made.close()
 
 
+def predicts(outline: Preview | None) -> bool:
+    return outline is not None and outline.curves["displacement"][1].size > 0
+
+
 def test_an_outline_has_the_curves_of_the_plan_and_cannot_be_played(
     session: Session, planner: Planner, qtbot: QtBot
 ) -> None:
     session.set_sequence(SHORT, Path())
+    shown: list[Preview] = []
+    session.outline_changed.connect(lambda: shown.append(session.outline))
     planner.hold(True)
-    qtbot.waitUntil(lambda: session.outline is not None, timeout=WAIT)
+    qtbot.waitUntil(lambda: predicts(session.outline), timeout=WAIT)
     found, expected = session.outline, make_preview(SHORT, Path(), RigFile())
     assert session.preview is None
+    # the voltage needs no model, and does not wait for the other process
+    voltage = next(outline for outline in shown if outline is not None)
+    assert voltage.curves["displacement"][1].size == 0
+    assert not voltage.playable
+    assert voltage.sentence == "one lobe"
+    assert voltage.segments == found.segments
+    np.testing.assert_allclose(voltage.curves["voltage"], found.curves["voltage"], atol=1e-9)
     assert not found.playable
     assert found.digest == ""
     assert found.sentence == "one lobe"
@@ -61,7 +74,7 @@ def test_the_pages_draw_it_and_nothing_can_be_armed(
     keep(sequence)
     session.set_sequence(SHORT, Path())
     planner.hold(True)
-    qtbot.waitUntil(lambda: session.outline is not None, timeout=WAIT)
+    qtbot.waitUntil(lambda: predicts(session.outline), timeout=WAIT)
     assert run.plots.curve("planned voltage")[1].max() == pytest.approx(6.0, abs=0.01)
     assert run.plots.curve("planned displacement")[1].max() > 0.0
     words = run.display.view.words.text()

@@ -72,7 +72,8 @@ def test_first_start_says_what_it_does_and_leaves_the_pages_usable(first_start, 
     qtbot.waitUntil(lambda: "kernel 12 of 40, " in bar.words.full_text, timeout=SOON)
     assert bar.bar.value() == pytest.approx(0.3 * bar.bar.maximum())
     assert not window.run_page.arm_button.isEnabled()
-    assert window.run_page.display.view.words.text() == "Planned: the plan is being made …"
+    words = window.run_page.display.view.words
+    qtbot.waitUntil(lambda: words.text().startswith("Preview, the model is being compiled"))
     # sequence, rig file and recordings take what is done to them
     session.set_sequence(SHORT, Path())
     session.set_rig_file(None, "", RigFile(limits=LimitsSettings(voltage_max_kV=7.0)))
@@ -96,6 +97,7 @@ def test_a_window_that_is_closed_meanwhile_ends_the_process(first_start, qtbot: 
     assert not window.compilation._worker.busy
 
 
+@pytest.mark.deep
 def test_what_cannot_be_compiled_is_an_alarm_and_the_plan_is_made_all_the_same(
     session: Session, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ):

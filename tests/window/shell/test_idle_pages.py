@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
+from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.window.recordings.page import RecordingsPage
@@ -52,6 +55,14 @@ def test_what_is_closed_makes_nothing(session: Session, qtbot: QtBot) -> None:
     session.arming.emit()
     qtbot.wait(5)
     assert made == []
+
+
+@pytest.fixture
+def window(session: Session, keep: Callable[[QWidget], None]) -> MainWindow:
+    """The window as it opens for an operator."""
+    shown = MainWindow(session)
+    keep(shown)
+    return shown
 
 
 def test_no_page_is_left_to_be_made_once_the_rig_is_armed(

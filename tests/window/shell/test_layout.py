@@ -23,7 +23,7 @@ from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
 from tests.window.conftest import SHORT, press
 from tests.window.made_recordings import made
-from tests.window.shown_text import commands, cut_off, overlapping
+from tests.window.shown_text import commands, cut_off, overlapping, stretched
 
 #: The screen of a small notebook, a large one, and the small one at a scale of 1.5 without the
 #: frame of a window.
@@ -46,6 +46,7 @@ def wrong(window: MainWindow, qtbot: QtBot, state: str) -> list[str]:
                     ("cut", cut_off),
                     ("covered", overlapping),
                     ("command", commands),
+                    ("stretched", stretched),
                 )
                 for text in look(window)
             ]
@@ -83,6 +84,9 @@ def test_nothing_is_cut_or_covered_on_any_page_at_three_sizes(
     press(qtbot, window.run_page.start_button)
     qtbot.waitUntil(lambda: not window.run_page.runner.running, timeout=PATIENCE)
     found += wrong(window, qtbot, "Run, ended")
+    window.session.set_address("daqmx:Dev1@127.0.0.1:1")  # says what its watchdog is
+    qtbot.waitUntil(lambda: window.session.preview is not None, timeout=PATIENCE)
+    found += wrong(window, qtbot, "Run, on a card")
     for editor in window.findChildren(TomlEditor):
         assert "dearig" not in editor.toml
     assert sorted(set(found)) == [], "\n" + "\n".join(sorted(set(found)))
