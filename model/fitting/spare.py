@@ -28,7 +28,7 @@ from dearig.model.fitting.parameters import Estimate, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import resolved_times
 
-__all__ = ["SPARE", "Optimum", "Valleys", "sums_text", "valleys_of", "widened"]
+__all__ = ["SPARE", "Optimum", "Valleys", "sums_of_weak", "sums_text", "valleys_of", "widened"]
 
 #: Note of a parameter of a branch that may be two, or none.
 SPARE = "only the sum of several branches is determined"
@@ -354,6 +354,56 @@ def _sum(found: Valleys, branch: int, span: Span) -> Estimate:
         is_determined(*span),
         f"all branches that relax at about {values[_time(layout, branch)]:.3g} s together",
     )
+
+
+def sums_of_weak(
+    best: Optimum,
+    jacobian: np.ndarray,
+    estimates: Sequence[Estimate],
+    sums: Sequence[Estimate],
+    tick: Callable[[], None],
+    end: type[Exception],
+) -> tuple[Estimate, ...]:
+    """Return ``sums``, and those of branches whose times are apart and whose moduli are not known.
+
+    Such branches are neighbours in time: what one has the other lacks. A sum is added where the
+    data determine it. ``tick`` is called at each point of a profile; where it raises ``end``, no
+    further one is added.
+    """
+    layout = best.problem.layout
+    values, known = layout.values(best.x), {e.name: e for e in estimates}
+    told = {part for one in sums for part in one.name.split(" + ")}
+    groups: list[list[int]] = [[]]
+    times = {q.index: values[j] for j, q in enumerate(layout.quantities) if q.kind == "T"}
+    for branch in sorted(times, key=times.__getitem__):
+        e = known.get(f"mu_{branch}")
+        if e is None or e.determined or not e.free or e.constraint or e.name in told:
+            groups.append([])
+        else:
+            groups[-1].append(branch)
+    found = list(sums)
+    for group in groups:
+        if len(group) < 2:
+            continue
+        moduli = {b: float(values[_columns(layout, b)["mu", 0]]) for b in group}
+        total, *others = sorted(group, key=lambda b: -moduli[b])
+        try:
+            span = _of_sum(best, total, others, jacobian, tick)
+        except end:
+            break
+        if is_determined(*span):
+            low, high = (times[b] for b in (group[0], group[-1]))
+            found.append(
+                Estimate(
+                    " + ".join(f"mu_{b}" for b in sorted(group)),
+                    "Pa",
+                    sum(moduli.values()),
+                    *span,
+                    True,
+                    f"all branches that relax at {low:.3g} to {high:.3g} s together",
+                )
+            )
+    return tuple(found)
 
 
 def sums_text(sums: Sequence[Estimate]) -> str:

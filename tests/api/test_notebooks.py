@@ -25,7 +25,7 @@ def read(name: str) -> nbformat.NotebookNode:
     return nbformat.read(FOLDER / name, as_version=4)
 
 
-@pytest.fixture(scope="module", params=mostly_deep(NOTEBOOKS, ["analysis-of-recordings.ipynb"]))
+@pytest.fixture(scope="module", params=mostly_deep(NOTEBOOKS, []))
 def executed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
     """A notebook after all its cells ran, in an empty folder."""
     from nbclient import NotebookClient

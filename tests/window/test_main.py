@@ -39,8 +39,11 @@ def test_without_a_screen_it_says_so() -> None:
 @pytest.mark.parametrize(
     ("environment", "words"),
     [
-        ({"DISPLAY": ":77"}, "the screen :77 cannot be used: "),
-        ({"DISPLAY": ":77", "WAYLAND_DISPLAY": "wayland-77"}, "screen wayland-77 or :77 cannot be"),
+        ({"DISPLAY": ":59077"}, "the screen :59077 cannot be used: "),
+        (
+            {"DISPLAY": ":59077", "WAYLAND_DISPLAY": "wayland-77"},
+            "screen wayland-77 or :59077 cannot be",
+        ),
         ({"QT_QPA_PLATFORM": "nonsense"}, 'Could not find the Qt platform plugin "nonsense"'),
     ],
 )

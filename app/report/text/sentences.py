@@ -197,7 +197,13 @@ def undetermined_text(fit: Identification) -> str:
 
 def undetermined_names_text(names: Iterable[str]) -> str:
     """Return a sentence on parameters ``names`` that the data do not determine."""
-    named = listed(symbol(n).replace("_", " ") for n in names)
+    of_effects: dict[str, list[str]] = {}
+    for name in names:
+        effect, _, own = name.rpartition(": ")
+        of_effects.setdefault(effect, []).append(symbol(own).replace("_", " "))
+    plain = of_effects.pop("", [])
+    others = (f"{listed(own)} of {effect}" for effect, own in of_effects.items())
+    named = "; ".join(filter(None, (listed(plain), *others)))
     return (
         f"The data do not determine {named}: other values fit equally well. Do not quote these "
         f"values."

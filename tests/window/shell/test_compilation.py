@@ -97,6 +97,7 @@ def test_a_window_that_is_closed_meanwhile_ends_the_process(first_start, qtbot: 
     assert not window.compilation._worker.busy
 
 
+@pytest.mark.deep
 def test_what_cannot_be_compiled_is_an_alarm_and_the_plan_is_made_all_the_same(
     session: Session, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ):

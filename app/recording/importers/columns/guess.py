@@ -124,7 +124,8 @@ class Guess:
         found = self._of_unit(quantity)
         if not found:
             return
-        self._accept(quantity, found, "column", several=len(found) > 1)
+        strange = quantity != "time" and self._labels[found[0]].unexplained
+        self._accept(quantity, found, "column", several=len(found) > 1 or bool(strange))
 
     def _take_if_sure(self, quantity: str) -> None:
         """Pick the column of a quantity that a recording can do without, if it is sure."""
@@ -167,7 +168,10 @@ class Guess:
         """Propose the one column without a quantity that rises in even steps for the time."""
         source = self._chosen.source
         step = getattr(source, "step_s", None)
-        free = [n for n in self._free if self._labels[n] == Label(n)]
+        free = [
+            n for n in self._free
+            if self._labels[n] == Label(n, unexplained=self._labels[n].unexplained)
+        ]  # fmt: skip
         if not free or len(free) > COMPARED_MAX or len(free) == len(self._labels):
             return
         if step is not None and step(list(source.names)) is not None:

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 __all__ = ["markers_in"]
 
 #: How many times farther from 0 than all readings a marker is. An instrument's range is some times
-#: the readings, and the marker is made to lie outside of it.
-FAR = 100.0
+#: the readings, and the marker is made to lie outside of it. The second is for numbers that
+#: programs write for no reading, and hardly an instrument: nines, ends of integers, and 7999.
+FAR, FAR_CODE = 100.0, 2.0
 #: Markers of one column, at most: too near and too far; readings, and different ones, at least.
 _KINDS, _REPEATED, _DIFFERENT = 2, 2, 10
+_CODES = frozenset({7999.0, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0})
+_NINES = re.compile(r"9{3,}(?:\.9+|\.0)?")
 
 
-def markers_in(values: np.ndarray) -> tuple[np.ndarray, list[float]]:
+def markers_in(values: np.ndarray, codes_only: bool = False) -> tuple[np.ndarray, list[float]]:
     """Return where ``values`` (n,) hold a marker, (n,) bool, and the markers.
 
-    Markers are repeated exactly, are not most of the values, and are far off all of them.
+    Markers are far off all readings, and not most of the values. They are repeated exactly, or one
+    of the numbers that programs write for no reading; ``codes_only``, of values that a step may
+    bring far off, both.
     """
     none = np.zeros(values.size, dtype=bool)
-    if not values.size or not _is_repeated(values):
+    if not values.size or not (_is_repeated(values) or _is_code(_extreme(values))):
         return none, []
     size = np.abs(values)
     marked = np.zeros(values.size, dtype=bool)
@@ -29,20 +36,34 @@ def markers_in(values: np.ndarray) -> tuple[np.ndarray, list[float]]:
         extreme = float(left.max())
         same = left == extreme
         kinds = np.unique(values[same]).tolist()
-        if extreme <= 0.0 or int(same.sum()) < _REPEATED or len(kinds) + len(found) > _KINDS:
+        code = _is_code(extreme)
+        if extreme <= 0.0 or len(kinds) + len(found) > _KINDS or (codes_only and not code):
+            break
+        if int(same.sum()) < _REPEATED and (codes_only or not code):
             break
         marked |= same
         found += kinds
         rest = size[~marked & np.isfinite(size)]
         if 2 * int(marked.sum()) > values.size or not rest.size:
             break
-        if 0.0 < FAR * float(rest.max()) <= extreme and np.unique(rest).size >= _DIFFERENT:
+        far = FAR_CODE if all(map(_is_code, found)) else FAR
+        if 0.0 < far * float(rest.max()) <= extreme and np.unique(rest).size >= _DIFFERENT:
             return marked, found
     return none, []
 
 
+def _is_code(value: float) -> bool:
+    """Return True for a number that programs write where there is no reading."""
+    return abs(value) in _CODES or _NINES.fullmatch(f"{abs(value):.12g}") is not None
+
+
+def _extreme(values: np.ndarray) -> float:
+    """Return the value farthest from 0."""
+    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+    return high if high >= -low else low
+
+
 def _is_repeated(values: np.ndarray) -> bool:
     """Return True if the value farthest from 0 is there twice; most readings end here."""
-    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
-    extreme = high if high >= -low else low
-    return int(np.count_nonzero(values == extreme)) >= _REPEATED or high == -low
+    extreme = _extreme(values)
+    return int(np.count_nonzero(values == extreme)) >= _REPEATED or bool((values == -extreme).any())

@@ -96,10 +96,16 @@ class ColumnProposal:
             if not any(np.array_equal(self._values[name], self._values[n]) for n in different):
                 different.append(name)
         likely = target_name(quantity, LIKELY[DIMENSIONS[quantity]])
-        if len(different) != 1 or self._labels[different[0]].qualifier:
+        label = self._labels[different[0]] if different else None
+        if (
+            label is None
+            or len(different) > 1
+            or label.qualifier
+            or (label.unexplained and quantity != "time")
+        ):
             self._chosen.missing.append(likely)
             return
-        unit = self._labels[different[0]].unit
+        unit = label.unit
         target = target_of(target_name(quantity, unit) if unit else likely)
         # a few volts may be the output of an instrument
         raw = quantity == "voltage" and unit == "V"

@@ -10,10 +10,13 @@ import numpy as np
 from dearig.recording.content.timestamps import not_forward
 from dearig.recording.importers.source import LOST_MAX, NeedsOptionError, skip_or_refuse
 
-__all__ = ["check_forward", "one_clock"]
+__all__ = ["check_forward", "forward_rows", "jumps", "one_clock"]
 
 #: s: a day, the least fall of a time of day that is the next day, the step of summer time.
 _DAY, _NEXT_DAY, _SUMMER = 86_400.0, 43_200.0, 3600.0
+#: Usual steps from which a step is a jump, and jumps that are named at most: more are the pauses
+#: of a logger that writes when something happens.
+_JUMP, _JUMPS_MAX = 100.0, 3
 
 
 def one_clock(
@@ -22,8 +25,7 @@ def one_clock(
     """Return the times (n,) of a clock in s as one that goes forward, notes, and doubts.
 
     ``place`` says where a row is in the file. A time of day that falls by more than half a day is
-    of the next day. A clock that falls by an hour was set back at the end of summer time; one that
-    jumps by an hour may have been set forward, which is said only.
+    of the next day. A clock that falls by an hour was set back at the end of summer time.
     """
     notes: list[str] = []
     doubts: list[str] = []
@@ -43,14 +45,45 @@ def one_clock(
                 f"the time goes back by {-steps[at]:g} s after {place(at)}: did summer time end? "
                 f"An hour was added to what follows"
             )
-    ahead = np.abs(steps - _SUMMER - usual) <= 0.5 * usual
-    if usual < _SUMMER / 2.0:
-        doubts += [
-            f"the time jumps by {steps[at]:g} s after {place(at)}, and goes on in steps of "
-            f"{usual:g} s: did summer time begin?"
-            for at in np.flatnonzero(ahead).tolist()[:1]
-        ]
     return (time + added if notes or added.any() else time), notes, doubts
+
+
+def jumps(time: np.ndarray, place: Callable[[int], str]) -> list[str]:
+    """Return a sentence for each jump of times (n,) in s that go forward, if there are few.
+
+    A clock may have been set forward, or a second run appended. ``place`` says where a row is in
+    the file.
+    """
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    found = np.flatnonzero(steps >= _JUMP * usual)
+    if not 0.0 < usual < _SUMMER / 2.0 or found.size > _JUMPS_MAX:
+        return []
+    return [
+        f"the time jumps by {steps[at]:g} s after {place(at)}, and goes on in steps of "
+        f"{usual:g} s: "
+        + (
+            "did summer time begin?"
+            if abs(steps[at] - _SUMMER - usual) <= 0.5 * usual
+            else "was the clock set, or another run appended?"
+        )
+        for at in found.tolist()
+    ]
+
+
+def forward_rows(time: np.ndarray) -> np.ndarray:
+    """Return rows (n,) bool of ``time`` between which it goes forward; NaN is left out.
+
+    Either the first rows count, or the last ones, whichever leave out fewer: a stamp that lies
+    ahead is wrong itself, and not all that follow it.
+    """
+    there: np.ndarray = np.isfinite(time)
+    first, last = there.copy(), there.copy()
+    latest = np.maximum.accumulate(np.where(there, time, -np.inf))
+    first[1:] &= time[1:] > latest[:-1]
+    coming: np.ndarray = np.minimum.accumulate(np.where(there, time, np.inf)[::-1])[::-1]
+    last[:-1] &= time[:-1] < coming[1:]
+    return last if int(last.sum()) > int(first.sum()) else first
 
 
 def check_forward(time: np.ndarray, column: str, place: Callable[[int], str], path: object) -> None:
@@ -68,8 +101,7 @@ def check_forward(time: np.ndarray, column: str, place: Callable[[int], str], pa
             f"time",
             answers={"rate_Hz": rate},
         )
-    latest = np.maximum.accumulate(time)
-    lost = int((time[1:] <= latest[:-1]).sum())
+    lost = time.size - int(forward_rows(time).sum())
     more = "; a rate replaces the time of evenly spaced samples"
     raise skip_or_refuse(said, lost, time.size, more, option=["rate_Hz"])
 
@@ -81,13 +113,14 @@ def _shared(time: np.ndarray) -> tuple[float, str] | None:
     if (steps < 0.0).any() or first.size < 2 or first.size > (1.0 - LOST_MAX) * time.size:
         return None
     stamp = float(np.median(np.diff(time[first])))
-    rows = np.arange(time.size) - (time.size - 1) / 2.0
-    period = float(rows @ time) / float(rows @ rows)
-    apart = time - period * rows
+    # a stamp begins within one row, so its first rows tell the period best
+    rows = first - float(first.mean())
+    period = float(rows @ time[first]) / float(rows @ rows)
+    apart = time - period * np.arange(time.size)
     if float(apart.max() - apart.min()) > stamp + 2.0 * period:
         return None
-    # rounding to a stamp has a standard deviation of its length over sqrt(12)
-    tolerance = 2.0 * stamp / math.sqrt(12.0 * float(rows @ rows)) / period
+    # where in a row a stamp begins has a standard deviation of the row over sqrt(12)
+    tolerance = 2.0 / math.sqrt(12.0 * float(rows @ rows))
     return time.size / (first.size + 1), f"{1.0 / _roundest(period, tolerance):.9g}"
 
 

@@ -17,9 +17,11 @@ from dearig.recording.importers.columns.specimen import Specimen, specimen_from_
 from dearig.recording.importers.columns.start import Start, start_of
 from dearig.recording.importers.columns.time_faults import (
     check_forward,
+    forward_rows,
+    jumps,
     one_clock,
 )
-from dearig.recording.importers.quantities.clock_numbers import by_sixties
+from dearig.recording.importers.quantities.clock_numbers import by_sixties, counts_days
 from dearig.recording.importers.quantities.labels import names_of, suggestion
 from dearig.recording.importers.source import (
     GapError,
@@ -39,8 +41,10 @@ OPTIONAL = MappingProxyType(
         "temperature": "temperature",
     }
 )
-#: Quantities that an instrument measures, which writes a marker where it has no reading.
+#: Quantities that an instrument measures, which writes a marker where it has no reading, and those
+#: that a step may bring far off all other values.
 _MARKED = frozenset({"displacement", "force", "nominal_stress", "strain", "stretch", "current"})
+_STEPPED = frozenset({"time", "voltage", "voltage_monitor", "temperature"})
 #: Time in s above which a first time stamp counts from a fixed day, not from the start of a run.
 LONG_AGO = 1e7
 
@@ -267,12 +271,15 @@ def _read(
     if not good.all():
         table = {q: column[good] for q, column in table.items()}
     if "time" in picked:
+        _check_days(chosen, picked["time"], table["time"])
         table["time"] = _counted_by_sixties(chosen, picked["time"], table["time"], values)
     found = {
         q: picked[q].scale.apply(column) if q in picked else column for q, column in table.items()
     }
     if found["time"].size < 2:
         raise InputError(f"{path} has {found['time'].size} row of data; at least 2 are needed")
+    if "time" in picked:
+        values.warnings += jumps(found["time"], _place(source, good))
     first = float(found["time"][0])
     values.start = start_of(source, picked["time"].column if "time" in picked else None, first)
     if abs(first) > LONG_AGO:
@@ -285,6 +292,17 @@ def _read(
 def _is_clock(source: Source, column: str) -> bool:
     """Return True for a column of dates and times of day."""
     return getattr(source, "labels", {}).get(column) == "time"
+
+
+def _check_days(chosen: Chosen, pick: Pick, time: np.ndarray) -> None:
+    """Raise ``NeedsOptionError`` if ``time`` (n,), in s by its name, counts days from 1900."""
+    if pick.behind or pick.target.unit != "s" or not counts_days(time):
+        return
+    raise NeedsOptionError(
+        f"{chosen.source.path}: {pick.column!r} is in s, but its values, {time[0]:.9g} to "
+        f"{time[-1]:.9g}, seem to count days from 1900, as spreadsheets do",
+        answers={"column": f"time_d={pick.column}*1"},
+    )
 
 
 def _counted_by_sixties(chosen: Chosen, pick: Pick, time: np.ndarray, values: Values) -> np.ndarray:
@@ -403,8 +421,8 @@ def _unmarked(
 ) -> np.ndarray:
     """Return which rows have no marker for a missing reading, (n,) bool. Changes the warnings."""
     good = np.ones(table["time"].size, dtype=bool)
-    for quantity in _MARKED & table.keys():
-        marked, found = markers_in(table[quantity])
+    for quantity in (_MARKED | _STEPPED) & table.keys():
+        marked, found = markers_in(table[quantity], codes_only=quantity in _STEPPED)
         if found:
             good &= ~marked
             shown = " and ".join(f"{value:.9g}" for value in found)
@@ -449,9 +467,8 @@ def _good_rows(
         kept = seconds if good.all() else seconds[good]
         check_forward(kept, names["time"], _place(source, good), source.path)
         return good
-    latest = np.maximum.accumulate(np.where(good, seconds, -np.inf))
-    good[1:] &= seconds[1:] > latest[:-1]
-    return good
+    forward: np.ndarray = good & forward_rows(np.where(good, seconds, np.nan))
+    return forward
 
 
 def _note_left_out(chosen: Chosen, values: Values, good: np.ndarray) -> None:

@@ -82,9 +82,10 @@ class ExcelFile(StoredColumns):
             before = f"{printable(sheet.name)}/" if len(sheets) > 1 else ""
             for column in sheet.layout.columns:
                 table = "/".join(filter(None, (before.rstrip("/"), column.group)))
+                lasts = column.place in sheet.durations
                 columns[before + printable(column.name)] = Stored(
-                    _load(sheet, column), None, column.own, column.unit,
-                    "time" if column.since is not None else "", table,
+                    _load(sheet, column), None, column.own, "s" if lasts else column.unit,
+                    "time" if lasts or column.since is not None else "", table,
                     cell=_cell(sheet, column), row=sheet.row,
                     began=first_moment(column.since, column.is_open),
                 )  # fmt: skip
@@ -111,6 +112,10 @@ class _Sheet:
         self.report: Callable[[float], None] = unseen
         head = list(self._rows(HEAD_ROWS, values=True))
         self._formulas = self._empty_formulas(head)
+        #: places of columns of durations, which a workbook marks by their format
+        self.durations = frozenset(
+            place for row in head for place, cell in enumerate(row) if isinstance(cell, timedelta)
+        )
         lines = ["\t".join(_texts(row, self._formulas, _has_number(row))) for row in head]
         self.layout: TextLayout = layout_of("\n".join(lines), "utf-8", path, names_line, ("\t",))
         self._numbers: dict[int, array[float]] | None = None

@@ -12,12 +12,14 @@ import numpy as np
 
 from dearig.recording.importers.source import PARSER_FAILURES
 
-__all__ = ["ATTRIBUTE_MAX", "numbers_in", "pickled_texts", "texts_in", "unpacked"]
+__all__ = ["ATTRIBUTE_MAX", "numbers_in", "own_scale", "pickled_texts", "texts_in", "unpacked"]
 
 #: Bytes of an attribute that is read.
 ATTRIBUTE_MAX = 2**14
-#: A text in a pickle of protocol 0, in which pandas writes names.
-_PICKLED = re.compile(r"(?:^|[(\[a}sl\n])V([^\n]*)\n")
+#: A text in a pickle of protocol 0, in which pandas writes names, and one that is there again.
+_PICKLED = re.compile(
+    r"(?:^|(?<=[(\[a}sl\n]))(?:V(?P<text>[^\n]*)\n(?:p(?P<kept>\d+)\n)?|g(?P<again>\d+)\n)"
+)
 
 
 def texts_in(owner: h5py.Group | h5py.Dataset, name: str) -> list[str]:
@@ -61,24 +63,51 @@ def pickled_texts(owner: h5py.Group | h5py.Dataset, name: str) -> list[str]:
 
     Other protocols than 0, the one of HDF5 files, give none.
     """
-    return [
-        text for pickle in _values(owner, name) if isinstance(pickle, str)
-        for text in _PICKLED.findall(pickle)
-    ]  # fmt: skip
+    found: list[str] = []
+    for pickle in _values(owner, name):
+        kept: dict[str, str] = {}
+        for match in _PICKLED.finditer(pickle) if isinstance(pickle, str) else ():
+            text = match["text"]
+            if text is None and (text := kept.get(match["again"])) is None:
+                continue  # something else than a text
+            kept[match["kept"] or ""] = text
+            found.append(text)
+    return found
+
+
+#: Attributes that scale the integers of a converter, of which no convention says how.
+_SCALES = ("gain", "scale", "scaling", "slope", "factor", "calibration", "lsb", "resolution")
+
+
+def own_scale(data: h5py.Dataset) -> str:
+    """Return the attribute that scales the integers of ``data`` in a way of its own, or ""."""
+    if data.dtype.kind not in "iu":
+        return ""
+    return next(
+        (
+            f"{name} = {found[0]:g}" for name in data.attrs
+            if name.lower() in _SCALES and (found := numbers_in(data, name)) and found[0] != 1.0
+        ),
+        "",
+    )  # fmt: skip
 
 
 def unpacked(data: h5py.Dataset) -> Callable[[np.ndarray], np.ndarray] | None:
     """Return what makes numbers of the stored values of ``data``, as CF says; None if nothing.
 
-    ``scale_factor`` and ``add_offset`` scale; ``_FillValue`` and ``missing_value`` are gaps.
+    ``scale_factor`` and ``add_offset`` scale; ``_FillValue`` and ``missing_value`` are gaps;
+    ``_Unsigned`` says that stored integers have no sign.
     """
     scale = next(iter(numbers_in(data, "scale_factor")), 1.0)
     offset = next(iter(numbers_in(data, "add_offset")), 0.0)
     gaps = [*numbers_in(data, "_FillValue"), *numbers_in(data, "missing_value")]
-    if scale == 1.0 and offset == 0.0 and not gaps:
+    without_sign = data.dtype.kind == "i" and texts_in(data, "_Unsigned")[:1] == ["true"]
+    if scale == 1.0 and offset == 0.0 and not gaps and not without_sign:
         return None
 
     def unpack(values: np.ndarray) -> np.ndarray:
+        if without_sign:
+            values = values.view(values.dtype.str.replace("i", "u"))
         found = values.astype(np.float64) * scale + offset
         for gap in gaps:
             with np.errstate(all="ignore"):

@@ -14,8 +14,8 @@ from dearig.input_file import open_input
 from dearig.recording.content.layout import FORMAT
 from dearig.recording.content.safe import Refused, check_heaps, checked, item
 from dearig.recording.files import in_words, one_line
+from dearig.recording.importers.formats.hdf5_attributes import own_scale, unpacked
 from dearig.recording.importers.formats.hdf5_attributes import texts_in as _texts
-from dearig.recording.importers.formats.hdf5_attributes import unpacked
 from dearig.recording.importers.formats.mat_file import OBJECTS
 from dearig.recording.importers.formats.pandas_hdf5 import (
     block_names,
@@ -164,6 +164,8 @@ class _Walk:
             group, _, own = table.rpartition(self._between)
         unit = next((u for name in _UNITS for u in _texts(data, name)[:1]), "")
         unit = re.split(r"\s+since\s", unit)[0]
+        if scale := own_scale(data):
+            unit = f"{unit} with {scale}".strip()
         label = next((text for name in _LABELS for text in _texts(data, name)[:1]), "")
         known = unit_of(unit)
         if axis and known and "time" in known[1]:
@@ -180,7 +182,7 @@ class _Walk:
                 path,
                 Stored(
                     self._loader(data.name, _flat, unpack, kind), int(data.size), own,
-                    "s" if kind else unit, "time" if kind[:1] == "M" else label, group,
+                    "s" if kind else unit, "time" if kind else label, group,
                 ),
             )  # fmt: skip
             return
@@ -204,7 +206,7 @@ class _Walk:
                 label = unit = ""
             yield inside, Stored(
                 self._loader(data.name, _row(place) if turned else _column(place), unpack, kind),
-                rows, own_name, "s" if kind else unit, "time" if kind[:1] == "M" else label,
+                rows, own_name, "s" if kind else unit, "time" if kind else label,
                 path if names else group,
             )  # fmt: skip
 
@@ -219,7 +221,7 @@ class _Walk:
                 continue
             places = range(min(kind.shape[0], MATRIX_MAX)) if kind.shape else [None]
             names = [name] if not kind.shape else (
-                field_names(data.parent, data, name, kind.shape[0])
+                field_names(data, name, kind.shape[0])
                 or [f"{name}[{place}]" for place in places]
             )  # fmt: skip
             times = time_kind(data, f"{name}_kind")
@@ -234,7 +236,7 @@ class _Walk:
                     Stored(
                         self._loader(data.name, _field(name, place), None, times),
                         int(data.size), own, "s" if times else "",
-                        "time" if times[:1] == "M" else "", path,
+                        "time" if times else "", path,
                     ),
                 )  # fmt: skip
 

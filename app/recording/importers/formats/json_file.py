@@ -18,7 +18,8 @@ from dearig.input_file import open_input, parse_json
 from dearig.recording.files import in_words
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.formats.stored import Stored, StoredColumns
-from dearig.recording.importers.formats.text_layout import TextColumn, encoding_of
+from dearig.recording.importers.formats.text_layout import TextColumn
+from dearig.recording.importers.formats.text_lines import encoding_of
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.moments import first_moment, is_open_date, moment_of
 from dearig.recording.importers.source import printable
@@ -111,6 +112,12 @@ def _in_object(
         told = units if isinstance(units, list) and _is_text(units) else ()
         yield from _in_rows(rows, names, path, False, told)  # type: ignore[arg-type]
         return
+    if _is_rows_by_key(value):  # of rows that are numbered the keys say nothing
+        rows = [*value.values()]
+        if not _counts(value):
+            yield f"{path}.index" if path else "index", _stored([*value], "index", path)
+        yield from _in_objects(rows, path, table, False, depth)  # type: ignore[arg-type]
+        return
     if _is_keyed(value):
         yield path, _stored([*value.values()], path.rpartition(".")[2], table)
         return
@@ -139,6 +146,17 @@ def _is_keyed(value: Json) -> bool:
         return False
     keys = islice(value, LOOKED_AT)
     return all(_column_of(key) is not None for key in keys) and _is_column([*value.values()])
+
+
+def _is_rows_by_key(value: Mapping[str, Json]) -> bool:
+    """Return True for rows whose keys are numbers, or dates and times."""
+    looked_at = [*islice(value.items(), LOOKED_AT)]
+    return len(looked_at) > 1 and all(
+        _column_of(key) is not None
+        and isinstance(row, Mapping)
+        and not any(isinstance(inner, (list, Mapping)) for inner in row.values())
+        for key, row in looked_at
+    )
 
 
 def _counts(value: Mapping[str, Json]) -> bool:

@@ -10,7 +10,6 @@ import numpy as np
 from dearig.recording.content.safe import Refused, item
 from dearig.recording.importers.formats.hdf5_attributes import (
     ATTRIBUTE_MAX,
-    numbers_in,
     pickled_texts,
     texts_in,
 )
@@ -59,13 +58,13 @@ def _texts_of(data: object) -> list[str]:
     return [text.decode("utf-8", "replace") for text in data[()].tolist()]
 
 
-def field_names(group: h5py.Group, data: h5py.Dataset, field: str, width: int) -> list[str]:
+def field_names(data: h5py.Dataset, field: str, width: int) -> list[str]:
     """Return the names of the columns in a ``field`` of a table (format "table")."""
     found = pickled_texts(data, f"{field}_kind")
-    levels = max(int(next(iter(numbers_in(group, "levels")), 1)), 1)
-    if len(found) == width * levels > 0:
-        return ["/".join(found[i * levels : (i + 1) * levels]) for i in range(width)]
-    return found if len(found) == width else []
+    levels, left = divmod(len(found), max(width, 1))
+    if left or not levels:
+        return []
+    return ["/".join(found[i * levels : (i + 1) * levels]) for i in range(width)]
 
 
 def index_name(group: h5py.Group, data: h5py.Dataset, name: str) -> str:

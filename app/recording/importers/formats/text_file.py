@@ -40,11 +40,9 @@ from dearig.recording.importers.formats.text_layout import (
     HEAD_CHARACTERS,
     TextColumn,
     TextLayout,
-    cells_of,
-    encoding_of,
-    holds_data,
     layout_of,
 )
+from dearig.recording.importers.formats.text_lines import cells_of, encoding_of, holds_data
 from dearig.recording.importers.formats.text_sections import TextSection, sections_of
 from dearig.recording.importers.formats.text_table import Table
 from dearig.recording.importers.importer import Importer
@@ -60,6 +58,8 @@ SHORT = 2**15
 LONG = 2**24
 #: Threads that parse blocks.
 THREADS = 2
+#: A number with something behind it that is no comment: 1.#IND is how some programs write NaN.
+_NOT_COMMENT = re.compile(rb"[\d.]#")
 #: Bytes of an ASCII character in encodings where it has several.
 _WIDTHS = MappingProxyType({"utf-16": 2, "utf-32": 4})
 #: The first lines of a universal file: a separator, and the number of a kind of data.
@@ -416,7 +416,7 @@ class TextFile(NamedColumns[TextColumn]):
         import pandas as pd  # takes a second to import, and most commands read no table
 
         layout, wanted = self.layout, self._wanted
-        if not self._is_plain or not wanted:
+        if not self._is_plain or not wanted or (b"#" in block and _NOT_COMMENT.search(block)):
             return None
         undecided = {c.place for c in wanted if c.undecided and c.name not in self._decided}
         try:

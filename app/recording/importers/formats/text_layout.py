@@ -6,7 +6,6 @@ names, units, or a block of parameters of the machine.
 
 from __future__ import annotations
 
-import codecs
 import csv
 import functools
 import itertools
@@ -18,7 +17,15 @@ from datetime import datetime
 from pathlib import Path
 
 from dearig.errors import InputError
-from dearig.recording.importers.quantities.labels import has_east_asian_name, label_of
+from dearig.recording.importers.formats.text_lines import (
+    HEADER_LINES,
+    bare,
+    cells_of,
+    holds_data,
+    joined,
+    with_brackets,
+)
+from dearig.recording.importers.quantities.labels import label_of
 from dearig.recording.importers.quantities.moments import (
     MIDNIGHT,
     day_first_or_open,
@@ -33,9 +40,6 @@ __all__ = [
     "HEAD_CHARACTERS",
     "TextColumn",
     "TextLayout",
-    "cells_of",
-    "encoding_of",
-    "holds_data",
     "is_row",
     "layout_of",
 ]
@@ -45,20 +49,11 @@ HEAD_CHARACTERS = 2**16
 #: Columns, at most. Data loggers write some hundred; each name is compared with those known.
 COLUMNS_MAX = 2000
 
-_COMMENTS = ("#", "%", "//", ";#")
-_MARKS = {
-    codecs.BOM_UTF8: "utf-8-sig",
-    codecs.BOM_UTF32_LE: "utf-32",  # before UTF-16, whose mark it begins with
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-}
-_EAST_ASIAN = ("gb18030", "cp932")  # taken where they give a name that is known
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: any white space
 _RULE = re.compile(r"[\s|+:=_*-]+")  # a line that is drawn below the names
 _SAMPLE = 400  # lines of data that are looked at
-#: Lines above a table in which names are looked for, and names of quantities in a line of names
-#: that names fewer columns than there are, at least.
-HEADER_LINES, NAMED_MIN = 8, 2
+#: Names of quantities in a line of names that names fewer columns than there are, at least.
+NAMED_MIN = 2
 #: What a Campbell logger writes as the units of time stamps and of numbers of rows.
 _NO_UNITS = frozenset({"TS", "RN"})
 _LEAST = 2  # lines of data in a row that begin a table
@@ -114,46 +109,6 @@ class TextLayout:
     notes: tuple[str, ...] = ()
 
 
-def encoding_of(raw: bytes, path: Path) -> str:
-    """Return the encoding of a text that begins with ``raw``; ``InputError`` if it is none."""
-    for mark, encoding in _MARKS.items():
-        if raw.startswith(mark):
-            return encoding
-    raw = raw.rstrip(b"\0") or raw  # a logger that was cut off leaves zeros at the end
-    if b"\0" in raw:
-        # text of ASCII characters as UTF-16 has a zero in every other byte
-        even, odd = raw[::2].count(0), raw[1::2].count(0)
-        half = len(raw) / 2
-        if odd > 0.8 * half and even < 0.1 * half:
-            return "utf-16-le"
-        if even > 0.8 * half and odd < 0.1 * half:
-            return "utf-16-be"
-        raise InputError(
-            f"{path} is not a text file, and of no other kind that can be imported; export it as "
-            f"text from the program that made it"
-        )
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(raw)
-    except UnicodeDecodeError:
-        # numbers are ASCII in any case; only a name may be decoded wrongly
-        for encoding in _EAST_ASIAN:
-            text = codecs.getincrementaldecoder(encoding)("replace").decode(raw)
-            if "\N{REPLACEMENT CHARACTER}" not in text and has_east_asian_name(text):
-                return encoding
-        return "cp1252" if not set(raw) & {0x81, 0x8D, 0x8F, 0x90, 0x9D} else "latin-1"
-    return "utf-8"
-
-
-def cells_of(line: str, delimiter: str | None) -> list[str]:
-    """Return the cells of ``line`` without quotes and surrounding blanks."""
-    if delimiter is None:
-        return line.split()
-    if '"' not in line:
-        return [cell.strip() for cell in line.split(delimiter)]
-    reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
-    return [cell.strip() for cell in next(reader)]
-
-
 def layout_of(
     head: str,
     encoding: str,
@@ -166,7 +121,7 @@ def layout_of(
     ``names_line`` is the number of the line of names, from 1, where the user says it; one of
     ``delimiters`` separates the cells. Raises ``InputError`` if there is no table of numbers.
     """
-    lines = head.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = joined(head.replace("\r\n", "\n").replace("\r", "\n").split("\n"))
     if not any(map(str.strip, lines)):
         raise InputError(f"{path} is empty")
     forced = re.fullmatch(r'"?sep=(.)"?\s*', lines[0])
@@ -203,12 +158,6 @@ def _no_table(lines: Sequence[str], start: int, path: Path) -> InputError:
         f"the right file",
         option="names_line",
     )
-
-
-def holds_data(line: str) -> bool:
-    """Return True unless ``line`` is blank or a comment."""
-    text = line.strip(" \t\r\n\f\v;,|")  # a row of empty cells is blank
-    return bool(text) and not line.strip().startswith(_COMMENTS)
 
 
 @dataclass(frozen=True)
@@ -271,7 +220,7 @@ class _Table:
         columns, notes = self._columns(names, units, groups)
         used = self.first if line < 0 else line
         block = tuple(
-            tuple(c for c in cells_of(_bare(text), self.delimiter) if c)
+            tuple(c for c in cells_of(bare(text), self.delimiter) if c)
             for text in self.lines[self.start : used]
             if text.strip()
         )
@@ -337,7 +286,7 @@ class _Table:
         """
         lines = {
             i: cells for i in above
-            if len(cells := self._split(i)) >= self._used
+            if (len(cells := self._split(i)) >= self._used or sum(map(_says, cells)) >= NAMED_MIN)
             and (self.delimiter is not None or len(cells) == self.cells)
         }  # fmt: skip
         said = {
@@ -346,7 +295,7 @@ class _Table:
         best = max(lines, key=lambda i: (said[i], i), default=-1)
         if best < 0 or not said[best]:
             return None
-        names = list(lines[best])
+        names = (lines[best] + [""] * self.cells)[: max(self.cells, len(lines[best]))]
         units: list[str] = []
         for number, cells in lines.items():
             if number != best and not units and (_are_units(cells) or _are_all_units(cells)):
@@ -357,7 +306,8 @@ class _Table:
                 if not name and i != best and cells is not units and place < len(cells)
             )  # fmt: skip
             names[place] = name or next((c for c in others if c and not is_number(c)), "")
-        return best, names, units
+        below = self._split(best + 1) if best + 1 in above and lines.get(best + 1) != units else []
+        return best, _merged(lines[best], below, names), units
 
     @property
     def _used(self) -> int:
@@ -381,16 +331,16 @@ class _Table:
         return next((row for row in rows if row[:1] == ["Y_Unit_Label"]), [])
 
     def _split(self, line: int) -> list[str]:
-        text = _bare(self.lines[line])
+        text = bare(self.lines[line])
         cells = cells_of(text, self.delimiter)
-        if text != self.lines[line].strip() and len(cells) != self.cells:
+        if text is not self.lines[line] and len(cells) != self.cells:
             # names in a comment may be separated in another way
             for other in _DELIMITERS:
                 if len(split := cells_of(text, other)) == self.cells:
                     return split
         if self.delimiter is None and len(cells) != self.cells:
             # names have single blanks in them, or units in brackets behind them
-            for wide in (re.split(r"\s{2,}|\t", text.strip()), _with_brackets(cells)):
+            for wide in (re.split(r"\s{2,}|\t", text.strip()), with_brackets(cells)):
                 if len(wide) == self.cells:
                     return wide
         return cells
@@ -534,20 +484,20 @@ def _positive(text: str) -> float | None:
     return value if 0.0 < value < float("inf") else None
 
 
-def _with_brackets(cells: Sequence[str]) -> list[str]:
-    """Return ``cells`` with those in brackets behind the cell before them."""
-    found: list[str] = []
-    for cell in cells:
-        if found and cell[:1] in "[(":
-            found[-1] += f" {cell}"
-        else:
-            found.append(cell)
+def _merged(titles: Sequence[str], below: Sequence[str], names: list[str]) -> list[str]:
+    """Return ``names`` with the title before each where merged cells of ``titles`` are over them.
+
+    A merged cell has its text in the first place, and the line ``below`` a text in each.
+    """
+    found, title = list(names), ""
+    for place, name in enumerate(below):
+        over = titles[place] if place < len(titles) else ""
+        after = titles[place + 1] if place + 1 < len(titles) else ""
+        starts = bool(over and name and not after and place + 1 < len(below) and below[place + 1])
+        title = over if starts else "" if over or not name else title
+        if title:
+            found[place] = f"{title} {name}"
     return found
-
-
-def _bare(line: str) -> str:
-    """Return ``line`` without the sign of a comment before it."""
-    return line.strip().lstrip("#%/;").strip() if line.strip().startswith(_COMMENTS) else line
 
 
 def _says(cell: str) -> bool:

@@ -11,7 +11,8 @@ from pathlib import Path
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
-from dearig.recording.importers.formats.text_layout import TextLayout, cells_of, is_row
+from dearig.recording.importers.formats.text_layout import TextLayout, is_row
+from dearig.recording.importers.formats.text_lines import cells_of
 from dearig.recording.importers.source import printable
 
 __all__ = ["TextSection", "sections_of"]

@@ -1,4 +1,4 @@
-"""Quantities of columns, by names in English, German, French, Chinese and Japanese.
+"""Quantities of columns, by names in the languages of many laboratories.
 
 ``voltage_kV`` is the name that this program gives a voltage in kV: the quantity and the unit.
 Files of other programs call it ``Voltage [kV]``, ``Spannung / kV`` or ``Tension (kV)``.
@@ -18,6 +18,7 @@ from dearig.recording.importers.quantities.qualifiers import (
     COMPRESSIVE,
     TRUE,
     is_harmful,
+    is_harmless,
     qualifier_in,
 )
 from dearig.recording.importers.quantities.units import UNITS, WIDE_BRACKETS, UnitScale, unit_of
@@ -63,19 +64,25 @@ def _plain(text: str) -> str:
 #: together, such as Standardkraft, counts by its end.
 _WORDS = MappingProxyType(
     {
-        "time": "time zeit temps timestamp timestamps zeitstempel datetime elapsed t",
+        "time": "time zeit temps timestamp timestamps zeitstempel datetime elapsed t tiempo tempo "
+        "tijd tid czas cas время",
         "voltage_monitor": "monitor moniteur vmon",
         "voltage": "voltage volt volts spannung tension hv highvoltage hochspannung u v potential "
-        "potentiel",
-        "current": "current curr strom courant i imon leakage",
-        "temperature": "temperature temperatur temp",
+        "potentiel voltaje tensione tensao spanning napiecie napeti напряжение",
+        "current": "current curr strom courant i imon leakage corriente corrente stroom prad ток",
+        "temperature": "temperature temperatur temp temperatura temperatuur teplota температура",
         "stretch": "stretch lambda λ streckung streckgrad",
-        "strain": "strain dehnung deformation verformung",
-        "nominal_stress": "stress contrainte spannung zugspannung nennspannung",
-        "force": "force load kraft last charge effort f",
+        "strain": "strain dehnung deformation verformung compression stauchung deformacion "
+        "deformazione deformacao rek деформация",
+        "nominal_stress": "stress contrainte spannung zugspannung nennspannung esfuerzo sforzo "
+        "напряжение",
+        "force": "force load kraft last charge effort f tension fuerza forza forca kracht siła "
+        "sila сила",
         "displacement": "displacement disp displ deflection lvdt travel extension weg verschiebung "
         "deplacement stroke hub position elongation auslenkung langenanderung allongement "
-        "verlangerung laser crosshead traverse course dehnung",
+        "verlangerung laser crosshead traverse course dehnung compression stauchung "
+        "desplazamiento spostamento deslocamento verplaatsing forskjutning przemieszczenie "
+        "posunuti перемещение",
     }
 )
 _QUANTITIES_OF: dict[str, list[str]] = {}
@@ -130,6 +137,7 @@ class Label:
     ``asked`` are quantities that the column may be although its word ``qualifier`` leaves it open:
     "desired displacement". ``conflict`` is a unit that the file gives beside the name and that is
     another one than the name's. ``compressive``: its positive values mean compression.
+    ``unexplained`` is a word of a name without a quantity that is not known.
     """
 
     name: str
@@ -142,6 +150,7 @@ class Label:
     qualifier: str = ""
     conflict: str = ""
     compressive: bool = False
+    unexplained: str = ""
 
 
 @dataclass(frozen=True)
@@ -223,7 +232,9 @@ def label_of(name: str, unit: str = "") -> Label:
             break
     symbol, dimensions = found or ("", ())
     beside = unit_of(unit) if unit else None
-    conflict = beside[0] if beside and found and beside[0] != symbol else ""
+    conflict = ""
+    if found and unit and (beside is None or beside[0] != symbol):
+        conflict = beside[0] if beside else unit
     unknown = "" if found else unit or _unknown_unit(name)
     said = _read(words)
     quantities, raw = said.quantities, ""
@@ -233,20 +244,37 @@ def label_of(name: str, unit: str = "") -> Label:
         if raw and raw != "voltage_monitor":
             quantities = []
         quantities = [q for q in quantities if DIMENSIONS[q] in dimensions]
-    asked = tuple(q for q in said.asked if not found or DIMENSIONS[q] in dimensions)
+    asked = [q for q in said.asked if not found or DIMENSIONS[q] in dimensions]
+    qualifier = said.qualifier
+    if match := _COMPUTED.search(words if found else _IN_BRACKETS.sub(" ", bracketed)):
+        asked, qualifier = list(dict.fromkeys([*quantities, *asked])), match[0].strip()
     if asked:  # the word counts for the column, whichever of its words is the quantity
         quantities, raw = [], ""
+    unexplained = "" if quantities or asked or raw else said.unexplained
     return Label(
-        name, tuple(quantities), symbol, dimensions, raw, unknown, asked, said.qualifier, conflict,
-        said.compressive,
+        name, tuple(quantities), symbol, dimensions, raw, unknown, tuple(asked), qualifier,
+        conflict, said.compressive, unexplained,
     )  # fmt: skip
+
+
+#: What says that the values of a column were computed from the quantity in its name: *1000, /2,
+#: d(x)/dt, log10, a square, a sign, peak to peak.
+_COMPUTED = re.compile(
+    r"[*\N{MULTIPLICATION SIGN}\N{MIDDLE DOT}]\s*[\d.]+|\b[xX]\s?\d{2,}|/\s*\d+(?:\.\d+)?\s*$"
+    r"|\^|[\N{SUPERSCRIPT TWO}\N{SUPERSCRIPT THREE}\N{SQUARE ROOT}\N{PARTIAL DIFFERENTIAL}]"
+    r"|^\s*[-\N{MINUS SIGN}]\s*(?=[^\W\d])|\bd\s*\[|/\s*dt\b|\blog\s?\d+|\b[pP]-[pP]\b"
+)
 
 
 def _unknown_unit(name: str) -> str:
     """Return a short text in brackets at the end of ``name``, which may be a unit, or ""."""
     bracketed = name.strip().translate(_BRACKETS)
     inside = _IN_BRACKETS.findall(bracketed)[-1].strip() if bracketed.endswith("]") else ""
-    return inside if len(inside) <= UNIT_MAX and re.match(r"[^\W\d]|°|%", inside) else ""
+    return inside if len(inside) <= UNIT_MAX and _UNIT_LIKE.match(inside) else ""
+
+
+#: What begins as a unit does: a letter, or a factor before one, as in 0.01 mm.
+_UNIT_LIKE = re.compile(r"[^\W\d]|[°%\N{PER MILLE SIGN}]|[xX*\d.^+-]+\s*[^\W\d]")
 
 
 #: Characters of a unit, at most: (measured) is none.
@@ -264,12 +292,16 @@ _UNIT_IN_NAME = (
 
 @dataclass(frozen=True)
 class _Said:
-    """What the words of a name say: quantities, those that it leaves open, and by which word."""
+    """What the words of a name say: quantities, those that it leaves open, and by which word.
+
+    ``unexplained`` is the first word that is not known.
+    """
 
     quantities: list[str]
     asked: list[str]
     qualifier: str
-    compressive: bool
+    compressive: bool = False
+    unexplained: str = ""
 
 
 def _words_of(name: str) -> list[str]:
@@ -292,13 +324,15 @@ def _read(name: str) -> _Said:
     """Return what the words of ``name`` say."""
     words = _words_of(name)
     qualifier = next(filter(is_harmful, words), "")
-    if _OTHERS.intersection(words):
-        return _Said([], [], qualifier, False)
+    if other := next((word for word in words if word in _OTHERS), ""):
+        return _Said([], [], qualifier or other)
     places: dict[int, list[str]] = {}
     for place, word in enumerate(words):
         known = _QUANTITIES_OF.get(word) or _east_asian(word)
         if known and (len(word) > 1 or len(words) == 1):  # a letter among words is an index
             places[place] = known
+    if not COMPRESSIVE.issuperset(words[place] for place in places):  # compression load is a load
+        places = {p: known for p, known in places.items() if words[p] not in COMPRESSIVE}
     sure: list[str] = []
     asked: list[str] = []
     for place, known in places.items():
@@ -316,7 +350,8 @@ def _read(name: str) -> _Said:
     sure, asked = list(dict.fromkeys(sure)), list(dict.fromkeys(asked))
     if "voltage_monitor" in sure:  # of the voltage, unless its name says of what
         sure = [q for q in sure if q in ("current", "displacement")] or ["voltage_monitor"]
-    return _Said(sure, asked, qualifier, bool(COMPRESSIVE.intersection(words)))
+    strange = next((w for at, w in enumerate(words) if at not in places and not is_harmless(w)), "")
+    return _Said(sure, asked, qualifier, bool(COMPRESSIVE.intersection(words)), strange)
 
 
 def _east_asian(word: str) -> list[str]:

@@ -23,6 +23,12 @@ __all__ = [
 
 #: A time of day, or a time since the start, which may have many hours or none.
 _CLOCK = re.compile(r"(?:(\d{1,5}):)?([0-5]?\d):([0-5]\d(?:\.\d+)?)")
+#: The same with thousandths behind a colon, which some loggers write.
+_THOUSANDTHS = re.compile(r"(\d{1,5}:[0-5]?\d:[0-5]\d):(\d{3})")
+#: A duration of ISO 8601, as pandas writes it into JSON.
+_ISO_DURATION = re.compile(
+    r"P(?P<days>\d{1,6})DT(?P<hour>\d{1,2})H(?P<minute>\d{1,2})M(?P<second>\d{1,2}(?:\.\d+)?)S"
+)
 _HALF_DAY = re.compile(r"(\d{1,2}):(\d{2}):(\d{2})(?:\.(\d+))? ?([AaPp])\.?[Mm]\.?")
 #: Days and a time of day as pandas writes a duration; a negative one has negative days.
 _DURATION = re.compile(
@@ -58,9 +64,11 @@ def moment_of(cell: str, day_first: bool | None = None) -> datetime | None:
     ``day_first`` is the order in a date such as 03/04/2024. Without it the date is any that is
     possible, with the day first, but the month where the time has AM or PM.
     """
+    if cell[:1] == "P" and (match := _ISO_DURATION.fullmatch(cell)):
+        return _after(match)
     if ":" not in cell or not (cell[:1].isalnum() or cell[:1] == "-"):
         return None
-    text = cell.replace(",", ".")
+    text = _THOUSANDTHS.sub(r"\1.\2", cell.replace(",", "."))
     if match := _CLOCK.fullmatch(text):
         hours, minutes, seconds = match.groups()
         if hours is None and "." not in seconds:
@@ -73,10 +81,7 @@ def moment_of(cell: str, day_first: bool | None = None) -> datetime | None:
     except ValueError:
         pass
     if match := _DURATION.fullmatch(text):
-        return MIDNIGHT + timedelta(
-            days=int(match["days"]), hours=int(match["hour"]), minutes=int(match["minute"]),
-            seconds=float(match["second"]),
-        )  # fmt: skip
+        return _after(match)
     if match := _HALF_DAY.fullmatch(text):
         hour, minute, second, part, half = match.groups()
         return _at(MIDNIGHT.date(), hour, minute, second, part, half)
@@ -88,6 +93,14 @@ def moment_of(cell: str, day_first: bool | None = None) -> datetime | None:
         if day is not None:
             return _at(day, *match.group("hour", "minute", "second", "part", "half"))
     return None
+
+
+def _after(match: re.Match[str]) -> datetime:
+    """Return the moment after midnight that the parts of a duration give."""
+    return MIDNIGHT + timedelta(
+        days=int(match["days"]), hours=int(match["hour"]), minutes=int(match["minute"]),
+        seconds=float(match["second"]),
+    )  # fmt: skip
 
 
 def first_moment(since: datetime | None, is_open: bool) -> datetime | None:

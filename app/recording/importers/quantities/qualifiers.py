@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from dearig.recording.importers.quantities.units import unit_of
 
-__all__ = ["COMPRESSIVE", "SHEAR", "TRUE", "is_harmful", "qualifier_in"]
+__all__ = ["COMPRESSIVE", "SHEAR", "TRUE", "is_harmful", "is_harmless", "qualifier_in"]
 
 
 def _set(words: str) -> frozenset[str]:
@@ -25,7 +25,7 @@ _HARMFUL = _set(
     circumferential hoop shear schub scher cisaillement flexure flexural bending biege torsion
     torsional static dynamic statisch dynamisch residual plastic plastisch elastic friction reib
     normal blocked blocking yield ultimate break fracture bruch rupture offset drift noise
-    rauschen difference envelope onset spitzen spitze maximale"""
+    rauschen difference envelope onset spitzen spitze maximale pk pp sp sd eff avg squared"""
 )
 #: Words of shear, which no model here describes.
 SHEAR = _set("shear schub scher cisaillement")
@@ -47,10 +47,11 @@ _HARMLESS = _set(
     smoothed filtered gefiltert tip end free actuator aktor dea vertical vertikal signal value
     values data daten wert device dev cdaq pxi slot mod module instrument unit cell sense the of
     and for across over with from electrode electric electrical elektrische drive driving
-    excitation log time since trek keyence keithley keysight agilent tektronix rigol yokogawa
+    excitation time since trek keyence keithley keysight agilent tektronix rigol yokogawa
     fluke matsusada spellman ultravolt hamamatsu philtec polytec omron panasonic epsilon micro
     optoncdt instron zwick mts linkam futek daq rig lab messwert col column spalte
-    grad deg percent prozent"""
+    grad deg percent prozent trace curve series waveform left right top bottom front back
+    dose axis kraftaufnehmer wegaufnehmer links rechts oben unten"""
 )
 #: Words that are harmless before some quantities only.
 _HARMLESS_FOR = MappingProxyType(
@@ -77,8 +78,7 @@ def qualifier_in(quantity: str, words: Sequence[str], at: int) -> str:
     """Return the word of a name that leaves open whether it is ``quantity``, or "".
 
     ``words`` are those of the name without accents and in small letters, ``at`` is the place of
-    the one that names the quantity. A word before it has to be known as harmless; one behind it
-    counts where it is known not to be.
+    the one that names the quantity. Every other one has to be known as harmless.
     """
     own = _HARMLESS_FOR.get(quantity, frozenset())
     for place, word in enumerate(words):
@@ -86,7 +86,7 @@ def qualifier_in(quantity: str, words: Sequence[str], at: int) -> str:
             continue
         if is_harmful(word):
             return word
-        if place < at and quantity not in _FREE and not _is_harmless(word):
+        if quantity not in _FREE and not is_harmless(word):
             return word
     return ""
 
@@ -96,5 +96,6 @@ def is_harmful(word: str) -> bool:
     return word in _HARMFUL or any(part in word for part in _EAST_ASIAN)
 
 
-def _is_harmless(word: str) -> bool:
+def is_harmless(word: str) -> bool:
+    """Return True if ``word`` leaves the quantity beside it as it is."""
     return len(word) <= _SHORT or word in _HARMLESS or unit_of(word) is not None

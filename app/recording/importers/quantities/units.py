@@ -125,7 +125,7 @@ ALIASES = MappingProxyType(
             "K": "kelvin Kelvin",
             "F": "°F degF deg_F fahrenheit Fahrenheit",
             "pct": "% percent Prozent pourcent",
-            "1": "- mm/mm m/m",
+            "1": "- mm/mm m/m in/in dimensionless",
         }.items()
         for alias in aliases.split()
     }

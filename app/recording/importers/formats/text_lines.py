@@ -1,0 +1,116 @@
+"""Lines and cells of a text: its encoding, comments, quotes, and cells between separators."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from dearig.errors import InputError
+from dearig.recording.importers.quantities.labels import has_east_asian_name
+
+__all__ = [
+    "HEADER_LINES",
+    "bare",
+    "cells_of",
+    "encoding_of",
+    "holds_data",
+    "joined",
+    "with_brackets",
+]
+
+#: Lines above a table in which names are looked for, and lines of a name in quotes, at most.
+HEADER_LINES = 8
+_COMMENTS = ("#", "%", "//", ";#")
+_MARKS = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF32_LE: "utf-32",  # before UTF-16, whose mark it begins with
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+_EAST_ASIAN = ("gb18030", "cp932")  # taken where they give a name that is known
+
+
+def encoding_of(raw: bytes, path: Path) -> str:
+    """Return the encoding of a text that begins with ``raw``; ``InputError`` if it is none."""
+    for mark, encoding in _MARKS.items():
+        if raw.startswith(mark):
+            return encoding
+    raw = raw.rstrip(b"\0") or raw  # a logger that was cut off leaves zeros at the end
+    if b"\0" in raw:
+        # text of ASCII characters as UTF-16 has a zero in every other byte
+        even, odd = raw[::2].count(0), raw[1::2].count(0)
+        half = len(raw) / 2
+        if odd > 0.8 * half and even < 0.1 * half:
+            return "utf-16-le"
+        if even > 0.8 * half and odd < 0.1 * half:
+            return "utf-16-be"
+        raise InputError(
+            f"{path} is not a text file, and of no other kind that can be imported; export it as "
+            f"text from the program that made it"
+        )
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(raw)
+    except UnicodeDecodeError:
+        # numbers are ASCII in any case; only a name may be decoded wrongly
+        for encoding in _EAST_ASIAN:
+            text = codecs.getincrementaldecoder(encoding)("replace").decode(raw)
+            if "\N{REPLACEMENT CHARACTER}" not in text and has_east_asian_name(text):
+                return encoding
+        return "cp1252" if not set(raw) & {0x81, 0x8D, 0x8F, 0x90, 0x9D} else "latin-1"
+    return "utf-8"
+
+
+def cells_of(line: str, delimiter: str | None) -> list[str]:
+    """Return the cells of ``line`` without quotes and surrounding blanks."""
+    if delimiter is None:
+        return line.split()
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(delimiter)]
+    reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
+    return [cell.strip() for cell in next(reader)]
+
+
+def joined(lines: list[str]) -> list[str]:
+    """Return ``lines`` with names in quotes on one line each; their other lines are blank.
+
+    A spreadsheet writes the line breaks of its names into the file.
+    """
+    found, at = list(lines), 0
+    while at < len(lines) and not _DIGIT.match(lines[at]):
+        last = at
+        while found[at].count('"') % 2 and last + 1 < min(len(lines), at + HEADER_LINES):
+            last += 1
+            found[at], found[last] = f"{found[at]} {lines[last]}", ""
+        if found[at].count('"') % 2:
+            return list(lines)
+        at = last + 1
+    return found
+
+
+#: The first cell of a row of numbers.
+_DIGIT = re.compile(r'\s*"?[-+.]?\d')
+
+
+def holds_data(line: str) -> bool:
+    """Return True unless ``line`` is blank or a comment."""
+    text = line.strip(" \t\r\n\f\v;,|")  # a row of empty cells is blank
+    return bool(text) and not line.strip().startswith(_COMMENTS)
+
+
+def with_brackets(cells: Sequence[str]) -> list[str]:
+    """Return ``cells`` with those in brackets behind the cell before them."""
+    found: list[str] = []
+    for cell in cells:
+        if found and cell[:1] in "[(":
+            found[-1] += f" {cell}"
+        else:
+            found.append(cell)
+    return found
+
+
+def bare(line: str) -> str:
+    """Return ``line`` without the sign of a comment before it."""
+    return line.strip().lstrip("#%/;").strip() if line.strip().startswith(_COMMENTS) else line
