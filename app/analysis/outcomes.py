@@ -394,8 +394,8 @@ class DiagnoseOutcome:
     def families(self) -> tuple[tuple[str, float], ...]:
         """The probabilities of the families, largest first, with what validation says of them.
 
-        Where it does not confirm what was found, the part of the error above the noise that is left
-        on untouched recordings is of no known family.
+        Where it does not confirm what was found, or not to the noise, the part of the error above
+        the noise that is left on untouched recordings is of no known family.
         """
         return self._confirmed(self.finding.families)
 
@@ -409,12 +409,14 @@ class DiagnoseOutcome:
         return dict(self._confirmed(known)) if known else {}
 
     def _confirmed(self, families: tuple[tuple[str, float], ...]) -> tuple[tuple[str, float], ...]:
-        if self.verdict != NOT_CONFIRMED:
+        reasons = self.judgement.reasons
+        doubted = "validation" in reasons and "excitation" not in reasons
+        if not (self.finding.steps and (doubted or self.verdict == NOT_CONFIRMED)):
             return families
         left = 1.0
         if self.recommends_final:
             above = [
-                max(pooled_rms(some) ** 2 - (pooled_noise(some) or self.noise) ** 2, 0.0)
+                max(pooled_steady_rms(some) ** 2 - (pooled_noise(some) or self.noise) ** 2, 0.0)
                 for some in ([pair[i] for pair in self._comparable] for i in (0, 1))
             ]
             left = above[1] / above[0] if above[0] > 0.0 else 1.0

@@ -21,7 +21,7 @@ from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.reading.recording import Recording
 
-__all__ = ["diagnose", "identify", "simulate", "validate"]
+__all__ = ["ParameterSource", "diagnose", "identify", "simulate", "stated_in", "validate"]
 
 #: A recording or the path of one, or several.
 Recordings = Source | Iterable[Source]
@@ -31,7 +31,8 @@ Recordings = Source | Iterable[Source]
 ParameterSource = Path | str | Stated
 
 
-def _stated(parameters: ParameterSource | None) -> Stated:
+def stated_in(parameters: ParameterSource | None) -> Stated:
+    """Return what ``parameters`` state, a file or a mapping. Raises ``InputError``."""
     if parameters is None:
         return {}
     return load_parameter_file(parameters) if isinstance(parameters, Path | str) else parameters
@@ -131,7 +132,7 @@ def identify(
         branches=[branches] if isinstance(branches, int) else list(branches),
         spring=spring,
         branch_spring=branch_spring,
-        parameters=_stated(parameters),
+        parameters=stated_in(parameters),
         drive=drive,
         rest_length_mm=rest_length_mm,
         rig_file=None if rig_file is None else load_rig(rig_file)[0],
@@ -304,7 +305,7 @@ def diagnose(
         branches=branches,
         spring=spring,
         branch_spring=branch_spring,
-        parameters=_stated(parameters),
+        parameters=stated_in(parameters),
         drive=drive,
         rig_file=None if rig_file is None else load_rig(rig_file)[0],
         thorough=thorough,

@@ -29,8 +29,14 @@ from dearig.report.figures.parameters import branches_figure, parameters_figure
 from dearig.report.figures.residual import residual_figure
 from dearig.report.pages.page import write_report
 from dearig.report.text import diagnosis as words
+from dearig.report.text.diagnosis_tables import before_after_table
 from dearig.report.text.estimates import effect_table
-from dearig.report.text.sentences import identify_summary, validate_summary, warnings_of
+from dearig.report.text.sentences import (
+    fit_is_rejected,
+    identify_summary,
+    validate_summary,
+    warnings_of,
+)
 from dearig.report.text.tables import error_table, parameter_table
 
 if TYPE_CHECKING:
@@ -184,7 +190,7 @@ class IdentifyResult(_Reported):
         every = self._comparisons
         return card(
             f"Identification: {outcome.title}",
-            table_html(parameter_table(outcome.fit)),
+            table_html(parameter_table(outcome.fit, fit_is_rejected(outcome))),
             table_html(error_table("", every)),
             drawing(self.plot(outcome.train[0].name), f"Measurement and model, {outcome.title}"),
             sentences=[*identify_summary(outcome)[1:], *self.warnings],
@@ -359,7 +365,7 @@ class DiagnoseResult(_Reported):
         last = (*after.train, *after.validation)
         pairs = [(first[c.name], c) for c in last if c.name in first]
         if what == "errors":
-            return bars_figure(pairs, self.outcome.noise, self.outcome.kind)
+            return bars_figure(pairs, self.outcome.kind)
         chosen = _named([after for _, after in pairs], what, ["errors"])
         return before_after_figure(first[chosen.name], chosen)
 
@@ -376,7 +382,7 @@ class DiagnoseResult(_Reported):
     def _repr_html_(self) -> str:
         outcome = self.outcome
         parts = [
-            table_html(words.before_after_table(title, before, after, outcome.kind))
+            table_html(before_after_table(title, before, after, outcome.kind))
             for title, before, after in (
                 ("Untouched recordings", outcome.before.validation, outcome.after.validation),
                 ("Training recordings", outcome.before.train, outcome.after.train),

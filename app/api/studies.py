@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dearig.api.analysis import ParameterSource, stated_in
 from dearig.api.arguments import named_arguments
 from dearig.api.display import card, drawing, table_html, write_page
 from dearig.api.models import ModelSource, as_model_file
@@ -251,6 +252,7 @@ def study(
     intervals: bool = True,
     ended_early: str = "keep",
     own: Iterable[str] = (),
+    parameters: ParameterSource | None = None,
     progress: Progress = quiet,
 ) -> StudyResult:
     """Fit, diagnose or validate many recordings, each separately, into one table.
@@ -284,6 +286,8 @@ def study(
     own : iterable of str
         With ``identify``: the recordings of each film are fitted together, and these parameters
         (``mu_0``, ``permittivity``, ...) each recording has for itself.
+    parameters : mapping or path, optional
+        What is known of parameters, as for ``dearig.identify``: fixed values, bounds, priors.
     progress : callable, optional
         Called with a stage and the fraction of it that is done (0 to 1).
 
@@ -308,7 +312,16 @@ def study(
     sources = [each.path if isinstance(each, Recording) else Path(each) for each in given]
     file = None if model is None else as_model_file(model)
     options = with_model(
-        StudyOptions(do, branches, spring, drive, ended_early, intervals, own=tuple(own)),
+        StudyOptions(
+            do,
+            branches,
+            spring,
+            drive,
+            ended_early,
+            intervals,
+            own=tuple(own),
+            parameters=stated_in(parameters),
+        ),
         file if file is None or isinstance(file, ModelFile) else Path(file),
     )
     engine = engine_at(on, workers, fit_film if options.own else fit_task)

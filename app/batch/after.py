@@ -65,8 +65,9 @@ def compute(
 
     def identify() -> None:
         outcome = identify_recordings(
-            [recording], branches=(campaign.branches,), rig_file=rig_file, progress=progress
-        )
+            [recording], branches=(campaign.branches,), rig_file=rig_file,
+            parameters=campaign.parameters, progress=progress,
+        )  # fmt: skip
         if outcome.interrupted:
             raise Interrupted("interrupted during the fit after a run, at 0 V")
         found.numbers |= numbers_of(outcome)
@@ -78,8 +79,9 @@ def compute(
 
     def diagnose() -> None:
         outcome = diagnose_recordings(
-            [recording], branches=campaign.branches, rig_file=rig_file, progress=progress
-        )
+            [recording], branches=campaign.branches, rig_file=rig_file,
+            parameters=campaign.parameters, progress=progress,
+        )  # fmt: skip
         if outcome.finding.interrupted:
             raise Interrupted("interrupted during the diagnosis after a run, at 0 V")
         found.numbers |= numbers_of(outcome)

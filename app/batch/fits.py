@@ -26,6 +26,7 @@ from dearig.analysis.loops import cycle_edges
 from dearig.analysis.validate import validate_model
 from dearig.batch.numbers import errors_of, parameters_of, peaks_of
 from dearig.config.modelfile import load_model
+from dearig.config.parameterfile import Stated
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.content.fields import CONDITIONS, TEXTS
@@ -85,6 +86,7 @@ class StudyOptions:
     command or monitor. ``ended_early`` is keep, cut or leave-out. ``intervals``: 95 % intervals
     are computed. ``model`` is the text of the model file of a validation. ``own`` are parameters
     that each recording of a film has for itself, where its recordings are fitted together.
+    ``parameters`` is what is stated of parameters, by their names with their units.
     """
 
     do: str
@@ -95,6 +97,7 @@ class StudyOptions:
     intervals: bool = True
     model: str = ""
     own: tuple[str, ...] = ()
+    parameters: Stated = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -224,7 +227,8 @@ def _computed(recording: Recording, options: StudyOptions, progress: Progress) -
     if options.do == "identify":
         fitted = identify_recordings(
             [recording], branches=(options.branches,), spring=options.spring, drive=options.drive,
-            intervals=options.intervals, ended_early=options.ended_early, progress=progress,
+            intervals=options.intervals, ended_early=options.ended_early,
+            parameters=options.parameters, progress=progress,
         )  # fmt: skip
         if fitted.interrupted:
             raise KeyboardInterrupt
@@ -235,7 +239,7 @@ def _computed(recording: Recording, options: StudyOptions, progress: Progress) -
         }
     found = diagnose_recordings(
         [recording], branches=options.branches, drive=options.drive,
-        ended_early=options.ended_early, progress=progress,
+        ended_early=options.ended_early, parameters=options.parameters, progress=progress,
     )  # fmt: skip
     if found.finding.interrupted:
         # a person's ctrl-C is not a result that could be kept

@@ -139,6 +139,11 @@ def with_model(options: StudyOptions, model: Path | ModelFile | None) -> StudyOp
             f"parameters of each recording's own are for identify; {options.do} shares none",
             option=("own", "do"),
         )
+    if options.parameters and (options.own or options.do == "validate"):
+        raise InputError(
+            "what is known of parameters is for recordings that are fitted each alone",
+            option=("parameters", "own" if options.own else "do"),
+        )
     if model is None:
         return options
     if isinstance(model, ModelFile):

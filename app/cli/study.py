@@ -9,13 +9,18 @@ from typing import Annotated
 import typer
 
 from dearig.cli.options import (
+    Bounds,
     Drive,
     DriveChannel,
     EndedEarly,
     EndedEarlyOption,
+    Fixed,
     Force,
     Json,
+    ParameterFile,
+    Priors,
     SpringKind,
+    stated_by,
 )
 from dearig.cli.output import check_files, print_line, working, write_result
 from dearig.errors import InputError, Interrupted
@@ -82,6 +87,10 @@ def study(
             show_default=False,
         ),
     ] = None,
+    parameters: ParameterFile = None,
+    fix: Fixed = None,
+    bound: Bounds = None,
+    prior: Priors = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
@@ -98,11 +107,11 @@ def study(
     from dearig.cli.terminal import study_rows
     from dearig.report.text.study_table import study_table_json
 
-    check_files(force, (model, *(s for s in sources if s.is_file())), json=json)
+    check_files(force, (model, parameters, *(s for s in sources if s.is_file())), json=json)
     options = with_model(
         StudyOptions(
             do.value, branches, spring, drive.value, ended_early.value, intervals,
-            own=tuple(own or ()),
+            own=tuple(own or ()), parameters=stated_by(parameters, fix, bound, prior),
         ),
         model,
     )  # fmt: skip

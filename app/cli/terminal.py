@@ -14,20 +14,28 @@ from rich.text import Text
 from dearig.printable import printable
 from dearig.report.text.channels import channel_errors, channel_table
 from dearig.report.text.diagnosis import (
-    before_after_table,
-    experiment_table,
     family_label,
     headline,
+    summary,
+    warnings,
+)
+from dearig.report.text.diagnosis_tables import (
+    before_after_table,
+    experiment_table,
     rankings,
     step_table,
-    summary,
     thesis_before_after_table,
-    warnings,
 )
 from dearig.report.text.estimates import effect_table
 from dearig.report.text.laws import bounds_table, effect_named, law_lines, place_text
 from dearig.report.text.numbers import to_ascii
-from dearig.report.text.sentences import identify_summary, listed, validate_summary, warnings_of
+from dearig.report.text.sentences import (
+    fit_is_rejected,
+    identify_summary,
+    listed,
+    validate_summary,
+    warnings_of,
+)
 from dearig.report.text.tables import (
     Table,
     branch_trials,
@@ -64,9 +72,9 @@ __all__ = [
     "validate_tables",
 ]
 
-_NAME_MAX = (
-    28  # characters of a row's name; longer ones are cut in the middle, where names differ least
-)
+#: Characters of a row's name where the terminal has no room for more; longer ones are cut in the
+#: middle, where names differ least.
+_NAME_LEAST = 28
 _GAP = 2  # between columns
 # rich's own substitute on ASCII terminals has many vertical bars
 _ASCII_HEAD = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
@@ -81,7 +89,7 @@ def identify_table(outcome: IdentifyOutcome) -> RenderableType:
     return _Fitted(
         [
             *identify_summary(outcome),
-            parameter_table(outcome.fit),
+            parameter_table(outcome.fit, fit_is_rejected(outcome)),
             *_errors("Training", outcome.train, published),
             *_grouped("Validation", outcome.validation),
             *_channels((*outcome.train, *outcome.validation)),
@@ -265,7 +273,8 @@ def _in_per_cent(table: Table) -> Table:
 
 def _laid_out(table: Table, show: Callable[[str], str], width: int) -> Iterator[RenderableType]:
     yield Text(show(table.title), style="bold")
-    widths = _widths(table, show)
+    longest = max(_NAME_LEAST, width - _width(table, show, 0))
+    widths = _widths(table, show, longest)
     if _width(table, show) > width:
         yield from _listed(table, show)
     else:
@@ -282,7 +291,7 @@ def _laid_out(table: Table, show: Callable[[str], str], width: int) -> Iterator[
                 vertical="bottom",
             )
         for row in table.rows:
-            cells = [show(_cut(row.cells[0])), *(show(c) for c in row.cells[1:])]
+            cells = [show(_cut(row.cells[0], longest)), *(show(c) for c in row.cells[1:])]
             look = "dim" if row.muted else "bold" if row.mark else ""
             grid.add_row(*(Text(c) for c in cells), style=look)
         yield grid
@@ -307,21 +316,24 @@ def _listed(table: Table, show: Callable[[str], str]) -> Iterator[RenderableType
         yield Text(text, style="dim" if row.muted else "bold" if row.mark else "")
 
 
-def _widths(table: Table, show: Callable[[str], str]) -> list[int]:
+def _widths(table: Table, show: Callable[[str], str], longest: int) -> list[int]:
+    """Return the widths of the columns, with names of at most ``longest`` characters."""
     widths = [max(len(show(name)), len(show(unit))) for name, unit in table.head]
     for row in table.rows:
-        cells = (_cut(row.cells[0]), *row.cells[1:])
+        cells = (_cut(row.cells[0], longest), *row.cells[1:])
         widths = [max(w, Text(show(c)).cell_len) for w, c in zip(widths, cells, strict=True)]
     return widths
 
 
-def _width(table: Table, show: Callable[[str], str]) -> int:
-    widths = _widths(table, show)
+def _width(table: Table, show: Callable[[str], str], longest: int = _NAME_LEAST) -> int:
+    widths = _widths(table, show, longest)
     return sum(widths) + _GAP * (len(widths) - 1)
 
 
-def _cut(name: str) -> str:
-    if len(name) <= _NAME_MAX:
+def _cut(name: str, longest: int) -> str:
+    if len(name) <= longest:
         return name
-    half = (_NAME_MAX - 1) // 2
-    return f"{name[:half]}\N{HORIZONTAL ELLIPSIS}{name[len(name) - (_NAME_MAX - 1 - half) :]}"
+    half = (longest - 1) // 2
+    if half < 1:
+        return name[:longest]
+    return f"{name[:half]}\N{HORIZONTAL ELLIPSIS}{name[len(name) - (longest - 1 - half) :]}"

@@ -26,6 +26,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from dearig.config.notify import Notify, NotifyTable
+from dearig.config.parameterfile import Stated, stated_of
 from dearig.config.presets import PRESETS
 from dearig.config.safe_ends import SAFE_ENDS, SafeEnd
 from dearig.config.sequence_paths import clean, filled, flat, with_settings
@@ -98,6 +99,7 @@ diagnose = false                # find what the model lacks, which may take minu
 branches = 3                    # of the fitted model
 # model = "model.toml"          # the first model of validate, in this folder
 # stop_when = ["mu_0_kPa < 40"] # the campaign stops when a number leaves its band
+# parameters.mu_0_kPa = {mean = 46.0, sd = 0.5}   # or fixed; or low, high: as in a parameter file
 
 # a lifetime test: the recordings of other runs are reduced to the extremes of each cycle
 [keep]
@@ -145,6 +147,9 @@ class _After(TomlTable):
     )  # fmt: skip
     stop_when: list[str] = Field(
         default_factory=list, max_length=100, description="bands of numbers"
+    )
+    parameters: dict[str, Any] = Field(
+        default_factory=dict, description="what is known of parameters, a table for each"
     )
 
 
@@ -236,9 +241,9 @@ class Campaign:
     """A plan as read from ``toml``, with its ``runs`` in the order in which they are played.
 
     ``source`` names it in messages. ``branches`` is the number of Maxwell branches of what is
-    fitted. ``model`` is the file of the first model of ``validate``, None for none. Of
-    ``keep_every`` runs one recording is kept whole, and of the others one of ``keep_cycles``
-    cycles, 0 for none. ``sequences`` has the TOML of each sequence by its name in the plan.
+    fitted, ``parameters`` what is known of it. ``model`` is the file of the first model of
+    ``validate``, None for none. Of ``keep_every`` runs one recording is kept whole, of the others
+    one of ``keep_cycles`` cycles, 0 for none. ``sequences`` has the TOML of each by its name.
     ``notify`` are the settings of notifications.
     """
 
@@ -254,6 +259,7 @@ class Campaign:
     validate: bool
     diagnose: bool
     branches: int
+    parameters: Stated
     model: Path | None
     stop_when: tuple[Band, ...]
     keep_every: int
@@ -341,6 +347,7 @@ class _Expansion:
             validate=file.after.validates,
             diagnose=file.after.diagnose,
             branches=file.after.branches,
+            parameters=stated_of(file.after.parameters),
             model=model,
             stop_when=tuple(self._bands()),
             keep_every=file.keep.every,

@@ -294,7 +294,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "parameters": [_effect_number_json(e) for e in step.estimates],
                 "law": law_json(effect_named(step.effect)),
                 "train": _measures_json(stand.train, outcome.kind),
-                "selection": _selection_json(step.stage, after.train, outcome.kind),
+                "selection": _selection_json(step.stage, stand.train, outcome.kind),
                 "validation": _measures_json(stand.validation, outcome.kind),
                 "indistinguishable_from": list(step.indistinguishable_from),
                 "evidence": _evidence_json(step),
@@ -470,7 +470,7 @@ def _stand_json(stand: Evaluation) -> dict[str, Any]:
 
 def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, Any] | None:
     """Errors pooled over recordings (see ``report.diagnosis.pooled_errors``); None without any."""
-    from dearig.report.text.diagnosis import pooled_errors
+    from dearig.report.text.diagnosis_tables import pooled_errors
 
     errors = pooled_errors(comparisons)
     if errors is None:
@@ -489,19 +489,19 @@ def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, 
 
 def _selection_json(stage: Stage, train: tuple[Comparison, ...], kind: str) -> dict[str, Any]:
     """Of a cross-validation: its errors, relative to the ranges of the training recordings."""
-    from dearig.report.text.diagnosis import pooled_errors
+    from dearig.report.text.diagnosis import selection_rms
+    from dearig.report.text.diagnosis_tables import pooled_errors
 
     shown, errors = SHOWN[kind], pooled_errors(train)
+    rms = selection_rms(stage, train)
 
     def relative(of: float, known: float, value: float) -> float | None:
         return _number(of * value / known) if known > 0.0 else None
 
     return {
-        f"rms_{shown.suffix}": _number(stage.selection_rms * shown.error_factor),
-        "nrmse_pct": None
-        if errors is None
-        else relative(errors.nrmse_pct, errors.rms, stage.selection_rms),
-        "e_rms_thesis_pct": None if kind == "film" else _number(stage.selection_rms * 1e5),
+        f"rms_{shown.suffix}": _number(rms * shown.error_factor),
+        "nrmse_pct": None if errors is None else relative(errors.nrmse_pct, errors.rms, rms),
+        "e_rms_thesis_pct": None if kind == "film" else _number(rms * 1e5),
         "e_m_thesis_pct": None
         if errors is None
         else relative(errors.e_m_thesis_pct, errors.max, stage.selection_max),

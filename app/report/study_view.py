@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
 from dearig.report.as_json import diagnosis_json, outcome_json
-from dearig.report.text import diagnosis, sentences, tables
+from dearig.report.text import diagnosis, diagnosis_tables, sentences, tables
 from dearig.report.text.channels import channel_errors, channel_table
 from dearig.report.text.estimates import effect_table
 from dearig.report.text.tables import Table
@@ -103,17 +103,17 @@ def _diagnosis(outcome: DiagnoseOutcome) -> dict[str, Any]:
         ("Training recordings", outcome.before.train, outcome.after.train),
     ):
         if before and after:
-            pieces.append(diagnosis.before_after_table(heading, before, after, outcome.kind))
+            pieces.append(diagnosis_tables.before_after_table(heading, before, after, outcome.kind))
     channels = channel_table(outcome)
     if channels is not None:
         pieces.append(channels)
-    pieces.append(diagnosis.step_table(outcome))
+    pieces.append(diagnosis_tables.step_table(outcome))
     if finding.steps:
         pieces.append(effect_table(outcome))
-    rounds = diagnosis.rankings(outcome) or ("No round of candidates is complete.",)
-    dropped = diagnosis.dropped_effects(outcome)
+    rounds = diagnosis_tables.rankings(outcome) or (diagnosis.untried_text(outcome),)
+    dropped = diagnosis_tables.dropped_effects(outcome)
     proposal: list[str | Table] = [readable(f"{outcome.experiment_words.rstrip('.')}.")]
-    considered = diagnosis.experiment_table(outcome)
+    considered = diagnosis_tables.experiment_table(outcome)
     if considered is not None:
         proposal.append(considered)
     both = bool(finding.steps)
@@ -135,7 +135,7 @@ def _diagnosis(outcome: DiagnoseOutcome) -> dict[str, Any]:
 def _fit(outcome: IdentifyOutcome) -> dict[str, Any]:
     pieces: list[str | Table] = [
         *sentences.identify_summary(outcome),
-        tables.parameter_table(outcome.fit),
+        tables.parameter_table(outcome.fit, sentences.fit_is_rejected(outcome)),
         tables.error_table("Training", outcome.train),
     ]
     if outcome.validation:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS, EffectValues
@@ -32,7 +31,8 @@ def _shown(value: float, unit: str) -> str:
     return f"{float(f'{factor * value:.3g}'):g} {shown}"
 
 
-class ChannelSays(NamedTuple):
+@dataclass(frozen=True)
+class ChannelSays:
     """What a ``channel`` says of an effect: ``confirms``, ``denies`` or ``silent``; a sentence."""
 
     channel: str
@@ -45,7 +45,7 @@ class Denial:
     """An effect that explains the displacement, and the channel that denies it.
 
     The effect would change the channel by ``implied`` RMS; what the plain circuit leaves of it is
-    ``seen``, and its noise ``noise``, all in ``unit``.
+    ``seen``, and the noise of each of so many independent ``means`` is ``noise``, in ``unit``.
     """
 
     effect: str
@@ -55,15 +55,24 @@ class Denial:
     seen: float
     noise: float
     unit: str
+    means: float
+
+    @property
+    def is_of_monitor(self) -> bool:
+        """Whether the voltage monitor denies a fault of the amplifier."""
+        return self.channel == VOLTAGE_MONITOR and self.family == "amplifier"
 
     @property
     def text(self) -> str:
         """What the channel says, in a sentence."""
         implied, seen, noise = (_shown(v, self.unit) for v in (self.implied, self.seen, self.noise))
+        behind = ""
+        if self.is_of_monitor:
+            behind = ". It does not exclude a fault behind the point that the monitor reads"
         return (
             f"{self.effect} would explain the displacement, but the {_TITLES[self.channel]} denies "
-            f"it: it would change by {implied} RMS, and differs from the model without it by "
-            f"{seen} (noise {noise})"
+            f"it: the channel would change by {implied} RMS, and differs from the model without "
+            f"{self.effect} by {seen} (noise {noise} in each of {self.means:,.0f} means){behind}"
         )
 
 
@@ -168,6 +177,7 @@ class ChannelEvidence:
             left.rms,
             left.noise,
             self._channels.units[channel],
+            left.samples,
         )
 
     def says(self, model: Actuator, effect: str) -> tuple[ChannelSays, ...]:

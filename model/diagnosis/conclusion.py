@@ -173,6 +173,7 @@ class Conclusion:
         score = {
             members: self.judge.criterion(fit) + self.judge.settings.odds * len(members)
             for members, fit in self.found.fits.items()
+            if not self.judge.is_denied(fit)
         }
         found: dict[str, Fit] = {}
         for members in sorted(score, key=lambda m: score[m]):
@@ -230,10 +231,11 @@ class Conclusion:
             best.setdefault(" + ".join(sorted(set(map(family_of, fit.members)))), fit)
         found = []
         for family, fit in list(best.items())[:_LEADING]:
-            if isinstance(fit.model, Actuator):
+            model = fit.seen
+            if isinstance(model, Actuator):
                 moved = judge.of_displacement(self.found.baseline).criterion
                 moved -= judge.of_displacement(fit).criterion
-                said = evidence.of(fit.model)
+                said = evidence.of(model)
                 odds = (("displacement", moved), *((n, -value) for n, value in said.items()))
                 found.append((family, odds))
         return tuple(found)
@@ -260,7 +262,7 @@ class Conclusion:
                 f"without it the mean square of the fit's weighted residuals is "
                 f"{without.cost / best.cost:.3g} times as large",
                 f"without it the information criterion is worse by {worth:.0f}",
-                *(f"{_label(other)} explains these data as well" for other, _ in alike),
+                *(f"{_label(other, fit)} explains these data as well" for other, fit in alike),
             ]
             nearest = self.nearest(member)
             if nearest is not None:
@@ -396,8 +398,9 @@ def _values(step: Step) -> str:
     return ", ".join(f"{e.name} = {e.value:.4g} {e.unit}".strip() for e in step.estimates)
 
 
-def _label(member: str) -> str:
-    return "slow drift of the reading" if member == DRIFT else member
+def _label(member: str, fit: Fit) -> str:
+    unseen = ", which the voltage monitor does not show," if fit.unseen == member else ""
+    return "slow drift of the reading" if member == DRIFT else f"{member}{unseen}"
 
 
 def _families(end: Conclusion, found: dict[str, float]) -> tuple[tuple[str, float], ...]:
@@ -483,7 +486,7 @@ def _round(race: Race, judge: Judge, fitter: Fitter) -> Round:
         (name,) = fit.members - parent.members
         effect = EFFECTS[name]
         gain = judge.gain(parent, fit)
-        verdict = "worthless"
+        verdict = "denied" if judge.is_denied(fit) else "worthless"
         if race.taken is not None and fit.members == race.taken.members:
             verdict = "chosen"
         elif gain > judge.settings.odds:

@@ -85,8 +85,8 @@ class Search:
         self.progress, self.stop, self.log = progress, stop, log
         self.fits: dict[frozenset[str], Fit] = {}
         self.races: list[Race] = []
-        # of each effect that a channel denies: what the regression leaves with it, and the denial
-        self._denials: dict[str, tuple[float, Denial]] = {}
+        # of each effect that a channel denies: its best start, and the denial
+        self._denials: dict[str, tuple[Start, Denial]] = {}
         self._left_out: set[tuple[frozenset[str], str]] = set()
         self._searching, self._done = False, 0.0
         self._at_rest = ""  # the effect that the readings at rest have shown
@@ -127,6 +127,8 @@ class Search:
             self._searching = False
         if status == "budget" and len(best.members) > 1:
             best = self._pruned(best)
+        if status == "complete":
+            self._behind_the_monitor(best)
         sought = {family_of(e.name) for e in self.effects} - {"unknown"}
         if self.fitter.of_actuator:
             sought.add(family_of(DRIFT))
@@ -137,10 +139,39 @@ class Search:
 
     def _denied(self) -> tuple[Denial, ...]:
         """Return the denials of effects whose start explains the displacement as well as any."""
-        least = min((m for race in self.races for m in race.starts.values()), default=math.inf)
+        misfits = (
+            misfit
+            for race in self.races
+            for name, misfit in race.starts.items()
+            if not EFFECTS[name].is_general
+        )
+        least = min(misfits, default=math.inf)
         near = self.settings.noise_margin * least
-        found = sorted((m, name) for name, (m, _) in self._denials.items() if m < near)
+        found = sorted((s.misfit, n) for n, (s, _) in self._denials.items() if s.misfit < near)
         return tuple(self._denials[name][1] for _, name in found)
+
+    def _behind_the_monitor(self, best: Fit) -> None:
+        """Keep fits of amplifier faults that the monitor does not show, in place of each effect.
+
+        They explain the displacement, and the monitor denies them: it would not show a fault of its
+        own divider, or of what is behind it. The best named law and the general one are tried.
+        """
+        denials = [d for d in self._denied() if d.is_of_monitor]
+        if not denials or any(family_of(n) == denials[0].family for n in best.members):
+            return
+        names = [d.effect for d in denials if not EFFECTS[d.effect].is_general][:1]
+        names += [d.effect for d in denials if EFFECTS[d.effect].is_general]
+        for member in best.effects:
+            parent = self.without(best, member)
+            for name in names:
+                start = self._denials[name][0]
+                problem = self.fitter.problem(
+                    with_effect(parent.model, name, start.values), parent.drift
+                )
+                problem = JointProblem.without_channels(problem)
+                x = self.fitter.start_of(problem, parent.x, start.values)
+                fit = self.fitter.refined(self.fitter.descend(problem, x, 20))
+                self.keep(self.judge.unseen(fit, name, best))
 
     def _of_baseline(self, stage: str, fraction: float) -> None:
         # searches with and without stiffening springs each count from 0 to 1
@@ -320,7 +351,7 @@ class Search:
         starts = regression.starts(effects, extent)
         fits = self._run(parent, starts)
         if fits and not self.judge.is_noise(fits[0]):
-            fits = self._with_general(parent, regression, extent, fits, starts)
+            fits, starts = self._with_general(parent, regression, extent, fits, starts)
         self.races.append(
             Race(
                 parent,
@@ -337,9 +368,9 @@ class Search:
         regression: Regression,
         extent: Extent,
         fits: list[Fit],
-        starts: Mapping[str, list[Start]],
-    ) -> list[Fit]:
-        """Return ``fits``, and those of general laws.
+        starts: dict[str, list[Start]],
+    ) -> tuple[list[Fit], dict[str, list[Start]]]:
+        """Return ``fits`` and ``starts``, and those of general laws.
 
         The laws with a name have been fitted from their ``starts``; where the best leaves more than
         noise, its family may have another form. So may a family of which the regression leaves less
@@ -353,7 +384,7 @@ class Search:
             for name, some in regression.starts(laws, extent).items()
             if EFFECTS[name].family in families or some[0].misfit < least
         }
-        return self.judge.ranked([*fits, *self._run(parent, racing)])
+        return self.judge.ranked([*fits, *self._run(parent, racing)]), starts | racing
 
     def _run(self, parent: Fit, starts: Mapping[str, list[Start]]) -> list[Fit]:
         """Return the fits that came through one race, and keep them: the next may be the last."""
@@ -374,7 +405,7 @@ class Search:
         already = evidence.total(before) if isinstance(before, Actuator) else 0.0
         denial = evidence.denial(name, model)
         if denial is not None:
-            self._denials.setdefault(name, (starts[0].misfit, denial))
+            self._denials.setdefault(name, (starts[0], denial))
         return evidence.total(model) - already
 
     def _regression(self, parent: Fit) -> tuple[Regression, Extent]:

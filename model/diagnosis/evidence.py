@@ -119,10 +119,29 @@ class Judge:
 
     def _of_channels(self, fit: Fit) -> float:
         """Return what the electrical channels add to C; much where one denies an effect."""
-        if self.channels is None or not isinstance(fit.model, Actuator):
+        model = fit.seen
+        if self.channels is None or not isinstance(model, Actuator):
             return 0.0
-        veto = _DENIED if self.channels.denied(fit.model) else 0.0
-        return self.channels.total(fit.model) + veto
+        veto = _DENIED if self.is_denied(fit) else 0.0
+        return self.channels.total(model) + veto + fit.handicap
+
+    def is_denied(self, fit: Fit) -> bool:
+        """Whether a channel denies an effect of ``fit``."""
+        model = fit.seen
+        if self.channels is None or not isinstance(model, Actuator):
+            return False
+        return self.channels.denied(model) is not None
+
+    def unseen(self, fit: Fit, name: str, best: Fit) -> Fit:
+        """Return ``fit`` with its effect ``name`` as one that no channel shows.
+
+        It is no more probable than ``best``, which no channel speaks against, times the odds that
+        such a fault is not shown: the forms of two laws decide little between them.
+        """
+        found = replace(fit, unseen=name)
+        ahead = max(self.criterion(best) - self.criterion(found), 0.0)
+        odds = 2.0 * self.settings.tempering * math.log(1.0 / self.settings.unseen_share)
+        return replace(found, handicap=ahead + odds)
 
     def demanded(self, parent: Fit, fit: Fit) -> bool:
         """Whether an electrical channel supports ``fit`` over ``parent`` decisively."""

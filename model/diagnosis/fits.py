@@ -69,7 +69,8 @@ class Fit:
     ``fixed`` (d,) bool were held. ``cost`` is the mean square of the whitened residuals (N,) of the
     displacement, in units of the noise, in which a prior counts as a reading; ``jacobian`` (N, f)
     is one near ``x``, or not finite. It has further rows where priors or electrical channels take
-    part in the fit.
+    part in the fit. ``unseen`` is an effect that no channel shows, "" where there is none;
+    ``handicap`` is added to the criterion for it.
     """
 
     problem: WhitenedProblem
@@ -78,6 +79,8 @@ class Fit:
     cost: float
     residuals: np.ndarray
     jacobian: np.ndarray
+    unseen: str = ""
+    handicap: float = 0.0
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -99,6 +102,12 @@ class Fit:
         """The fitted model."""
         layout = self.problem.layout
         return layout.model(layout.values(self.x))
+
+    @property
+    def seen(self) -> Actuator | Strip:
+        """The fitted model as the channels see it."""
+        effects = tuple(e for e in self.model.effects if e[0] != self.unseen)
+        return replace(self.model, effects=effects)
 
     def by_relaxation_time(self) -> Fit:
         """Return the same fit with its branches in order of relaxation time."""

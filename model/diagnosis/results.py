@@ -75,7 +75,7 @@ class Candidate:
     decrease of the information criterion from the base, ``behind`` its distance to the best
     candidate of the round (0 for the best). ``verdict`` is one of chosen, indistinguishable
     (explains as much as the best, possibly with more parameters), better (than the base, but not
-    the best), worthless, failed. ``note`` gives the reason.
+    the best), worthless, denied (by a channel), failed. ``note`` gives the reason.
     """
 
     effect: str

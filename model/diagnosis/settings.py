@@ -77,6 +77,9 @@ class DiagnosisSettings:
         explains less may be a disguise.
     alike
         Gain of the criterion, odds of e^5, below which two explanations are not told apart.
+    unseen_share
+        Prior odds of a fault that a voltage monitor does not show, behind its tap or of its own
+        divider, against one of another family.
     noise_margin
         RMS over noise up to which a residual counts as noise.
     white_correlation
@@ -109,6 +112,7 @@ class DiagnosisSettings:
     share: float = 0.5
     trusted_share: float = 0.8
     alike: float = 10.0
+    unseen_share: float = 0.25
     noise_margin: float = NOISE_MARGIN
     white_correlation: float = 1.3
     drift_modes: int = 24

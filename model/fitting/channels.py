@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from threading import Lock
 
@@ -172,6 +173,14 @@ class _Circuit:
         area = thinning(int(c[HELD]), self._thin_stretch) ** 2
         self.area_slope = area * self.plain[loop.SLOPE]
 
+    @property
+    def least_conductance(self) -> float:
+        """Least conductance in series with a film that leaks, in S.
+
+        The charging that laws of leakage neglect takes less than a mean: else it were a lag.
+        """
+        return float(self.c[CAPACITANCE] / (self.step * self.every))
+
     def means(self, rows: np.ndarray) -> np.ndarray:
         """Return means (..., M) of neighbouring ``rows`` (..., N)."""
         whole = rows.shape[-1] // self.every
@@ -215,8 +224,7 @@ class _Channel:
             self.noise = max(self.noise, float(np.std(rest)))
         self._gain_error = channel.gain_error
         self._row = loop.OUTPUT if channel.name == VOLTAGE_MONITOR else loop.INTO
-        # the charging that laws of leakage neglect takes less than a mean: else it was a lag
-        self._least = circuit.c[CAPACITANCE] / (circuit.step * circuit.every)
+        self._least = circuit.least_conductance
         free = [np.ones_like(self.y)]
         if channel.name == CURRENT:
             free.append(circuit.area_slope)
@@ -441,12 +449,18 @@ class Channels:
         return sum(x.least * x.y.size for x in some) / count, _FUNCTIONS * len(some)
 
     def implied(self, model: Actuator, name: str) -> float:
-        """Return the RMS by which the effects of ``model`` change channel ``name``, in its unit."""
+        """Return the RMS by which the effects of ``model`` change channel ``name``, in its unit.
+
+        A voltage that drops in front of the film takes the least current that can do it.
+        """
         c = model.coefficients()
         squares, count = 0.0, 0
         for circuit in self._circuits:
+            rows = circuit.rows(c)
             row = loop.OUTPUT if name == VOLTAGE_MONITOR else loop.INTO
-            change = circuit.rows(c)[row] - circuit.plain[row]
+            change = rows[row] - circuit.plain[row]
+            if name == CURRENT:
+                change = change + circuit.least_conductance * rows[loop.DROP]
             squares, count = squares + float(change @ change), count + change.size
         return math.sqrt(squares / max(count, 1))
 
@@ -512,7 +526,12 @@ class JointProblem(WhitenedProblem):
     @staticmethod
     def alone(problem: WhitenedProblem) -> WhitenedProblem:
         """Return ``problem`` of the readings alone, without the rows of channels and priors."""
-        other = problem.without_priors()
+        return JointProblem.without_channels(problem.without_priors())
+
+    @staticmethod
+    def without_channels(problem: WhitenedProblem) -> WhitenedProblem:
+        """Return ``problem`` without the rows of channels."""
+        other = copy(problem)
         if isinstance(other, JointProblem):
             other._channels, other._more = None, 0
         return other

@@ -19,7 +19,7 @@ from dearig.model.fitting.intervals import (
 from dearig.model.fitting.levenberg import descend, gain_that_counts
 from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
-from dearig.model.fitting.spare import Optimum, valleys_of, widened
+from dearig.model.fitting.spare import OPEN, Optimum, sums_of_weak, valleys_of, widened
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
 __all__ = [
@@ -162,9 +162,11 @@ def estimates_with_intervals(
     sums: tuple[Estimate, ...] = ()
     on = best if finer is None else replace(best, problem=finer[0])
     valleys = None if ended() else valleys_of(on, estimates)
+    tick = _ticks(report, ended, layout.size, shares)
     if valleys is not None:
-        tick = _ticks(report, ended, layout.size, shares)
         estimates, sums = widened(valleys, estimates, tick, _Ended)
+    if not ended():
+        sums = sums_of_weak(best, jac, estimates, sums, tick, _Ended)
     names = tuple(n for n, h in zip(layout.names, held, strict=True) if not h)
     natural = np.where([q.logarithmic for q in layout.quantities], values, 1.0)[~held]
     return Intervals(tuple(estimates), names, cov * np.outer(natural, natural), sums)
@@ -222,7 +224,7 @@ def _estimate(
     determined = is_determined(low, high) and not at_end
     note = "" if determined else _open_text(low, high)
     if held:
-        note = _J_WORDS if low > 0.0 else "not determined by these data"
+        note = _J_WORDS if low > 0.0 else OPEN
     elif at_end:
         note = end_text(q, value)
     elif not followed:
@@ -274,7 +276,7 @@ def _open_text(low: float, high: float) -> str:
     if low < 0.0 < high:
         return "not distinguishable from 0 with these data"
     if low == 0.0 and math.isinf(high):
-        return "not determined by these data"
+        return OPEN
     if math.isinf(high):
         return "only a lower bound"
     if low == 0.0:

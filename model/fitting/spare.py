@@ -28,10 +28,21 @@ from dearig.model.fitting.parameters import Estimate, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import resolved_times
 
-__all__ = ["SPARE", "Optimum", "Valleys", "sums_text", "valleys_of", "widened"]
+__all__ = [
+    "OPEN",
+    "SPARE",
+    "Optimum",
+    "Valleys",
+    "sums_of_weak",
+    "sums_text",
+    "valleys_of",
+    "widened",
+]
 
 #: Note of a parameter of a branch that may be two, or none.
 SPARE = "only the sum of several branches is determined"
+#: Note of a parameter of which nothing is determined.
+OPEN = "not determined by these data"
 
 _ITERATIONS = 60  # of a descent into another valley
 _GAIN = 0.01  # of the threshold of an interval, at which it ends
@@ -287,6 +298,8 @@ def widened(
     except end:
         sums = {}
     most = max((high for _, high in sums.values()), default=math.inf)
+    # a sum that is not determined either says nothing
+    sums = {branch: span for branch, span in sums.items() if is_determined(*span)}
     changed = []
     for e in estimates:
         j = layout.names.index(e.name)
@@ -294,7 +307,7 @@ def widened(
         if j in parts and not held[j] and e.constraint is None:
             # a part that is faster than the records show may be larger than any sum
             high = max(most, e.high) if layout.quantities[j].kind == "mu" else math.inf
-            note = e.note if e.at_bound else SPARE
+            note = e.note if e.at_bound else SPARE if sums else OPEN
             changed.append(replace(e, low=0.0, high=high, determined=False, note=note))
         else:
             determined = e.determined and is_determined(low, high)
@@ -354,6 +367,56 @@ def _sum(found: Valleys, branch: int, span: Span) -> Estimate:
         is_determined(*span),
         f"all branches that relax at about {values[_time(layout, branch)]:.3g} s together",
     )
+
+
+def sums_of_weak(
+    best: Optimum,
+    jacobian: np.ndarray,
+    estimates: Sequence[Estimate],
+    sums: Sequence[Estimate],
+    tick: Callable[[], None],
+    end: type[Exception],
+) -> tuple[Estimate, ...]:
+    """Return ``sums``, and those of branches whose times are apart and whose moduli are not known.
+
+    Such branches are neighbours in time: what one has the other lacks. A sum is added where the
+    data determine it. ``tick`` is called at each point of a profile; where it raises ``end``, no
+    further one is added.
+    """
+    layout = best.problem.layout
+    values, known = layout.values(best.x), {e.name: e for e in estimates}
+    told = {part for one in sums for part in one.name.split(" + ")}
+    groups: list[list[int]] = [[]]
+    times = {q.index: values[j] for j, q in enumerate(layout.quantities) if q.kind == "T"}
+    for branch in sorted(times, key=times.__getitem__):
+        e = known.get(f"mu_{branch}")
+        if e is None or e.determined or not e.free or e.constraint or e.name in told:
+            groups.append([])
+        else:
+            groups[-1].append(branch)
+    found = list(sums)
+    for group in groups:
+        if len(group) < 2:
+            continue
+        moduli = {b: float(values[_columns(layout, b)["mu", 0]]) for b in group}
+        total, *others = sorted(group, key=lambda b: -moduli[b])
+        try:
+            span = _of_sum(best, total, others, jacobian, tick)
+        except end:
+            break
+        if is_determined(*span):
+            low, high = (times[b] for b in (group[0], group[-1]))
+            found.append(
+                Estimate(
+                    " + ".join(f"mu_{b}" for b in sorted(group)),
+                    "Pa",
+                    sum(moduli.values()),
+                    *span,
+                    True,
+                    f"all branches that relax at {low:.3g} to {high:.3g} s together",
+                )
+            )
+    return tuple(found)
 
 
 def sums_text(sums: Sequence[Estimate]) -> str:

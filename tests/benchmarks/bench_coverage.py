@@ -2,33 +2,51 @@
 
 Run as ``python -m tests.benchmarks.bench_coverage --rigs 100``, with ``--diagnose`` for the other.
 Each rig has a film of three branches and one noise, drawn by its seed; ``--diagnose`` gives it one
-effect of a list beside that, in turn. It makes the thesis's identification record, with a lead-in
+effect of a list beside that, in turn. With ``--hidden`` the rigs are those of the blind test that
+hide an effect: `identify` has a model without it, and only the intervals of fits that it does not
+call rejected are counted. Each rig makes the thesis's identification record, with a lead-in
 of 2 s, white noise, and the steps of a 16-bit converter, which holds the voltage; displacement is
 counted from the mean of the lead-in, as in a recording. With ``--table`` the voltage is straight
 between samples, which the record does not say. The truth is inside the model's class: what is
 counted is whether the intervals are honest, not whether the model is right. With each share stands
 its own 95 % interval (Clopper and Pearson), and the RMS of the errors in units of what the interval
-says.
+says. Where the model has the law of the rig, its chi-square is compared with the least of a fit
+that starts at the true numbers.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import tempfile
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import beta
 
+from dearig.acquisition.run import RunOptions
+from dearig.acquisition.run import record as run
+from dearig.config.rigfile import load_rig_file
+from dearig.config.sequencefile import load_sequence
+from dearig.model import kernel
 from dearig.model.diagnosis import diagnose
 from dearig.model.effects import EffectValues
 from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Network
 from dearig.model.fitting import Estimate, identify
+from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.parameters import FitLayout
+from dearig.model.fitting.rejection import misfit_p
+from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.records import ActuatorRecord, counted
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import Sequence
+from dearig.model.verdict import is_rejected
+from dearig.sim_backend.truth.cases import address_of
+from tests.blind.play import HERE, records_of
+from tests.blind.seeds import drawn
 
 EFFECTS_DRAWN: tuple[EffectValues, ...] = (
     (("load inertia", (("moving_mass", 0.15),)),),
@@ -114,6 +132,54 @@ def count(
     return missed
 
 
+def above_best(record: ActuatorRecord, found: Actuator, true: Actuator) -> float:
+    """Return chi-square of the model ``found``, less that of a fit from the ``true`` numbers."""
+    problem = WhitenedProblem([record], FitLayout(true), workers=1, fidelity=kernel.CAREFUL)
+    layout = problem.layout
+    limits = np.array([q.kind == "J" for q in layout.quantities])
+    start = np.clip(layout.coordinates(layout.initial()), layout.lower, layout.upper)
+    best = descend(problem, start, limits, 60, 0.1, 1e-4)
+    own = WhitenedProblem([record], FitLayout(found), workers=1, fidelity=kernel.CAREFUL)
+    here = own.costs(own.layout.coordinates(own.layout.initial())[None])[0]
+    return float(here - best.cost) * problem.samples
+
+
+def hiding(seed: int, generator: str) -> tuple[Actuator, ActuatorRecord, str]:
+    """Return the plain film of the rig of ``seed``, its record, and what the rig hides."""
+    case = drawn(seed, generator)
+    with tempfile.TemporaryDirectory() as folder:
+        path, rig = Path(folder) / "run.h5", Path(folder) / "rig.toml"
+        text = (HERE / "rig.toml").read_text(encoding="utf-8")
+        rig.write_text(f"{text}\n[card]\nsample_rate_Hz = 200.0\n", encoding="utf-8")
+        options = RunOptions(rig.read_text(encoding="utf-8"), seed=seed)
+        address = address_of(seed, generator)
+        run(load_sequence("thesis"), address, load_rig_file(rig), path, options)
+        (record,) = records_of([path])
+    return Actuator(case.film, case.load, case.network), record, " + ".join(case.families)
+
+
+def count_hidden(counts: dict[str, Count], seeds: Iterable[int], generator: str) -> None:
+    """Count the intervals of fits that lack what each rig hides, and that are not rejected."""
+    rejected = fitted = 0
+    for seed in seeds:
+        if not drawn(seed, generator).families:
+            continue
+        model, record, hidden = hiding(seed, generator)
+        fit = identify([record], model, workers=1)
+        if not isinstance(fit.model, Actuator):
+            raise TypeError("an actuator's record was fitted by something else")
+        fitted += 1
+        left = record.displacement - fit.model.simulate(record.drive, record.lag).displacement
+        p = misfit_p(left, left[: record.lead_in])
+        if is_rejected(p):
+            rejected += 1
+            print(f"{seed}: {hidden}, rejected", flush=True)
+            continue
+        missed = count(counts, fit.estimates, truths(model))
+        print(f"{seed}: {hidden}, not rejected (p = {p}), missed {missed or 'none'}", flush=True)
+    print(f"\n{rejected} of {fitted} models are rejected.")
+
+
 def main() -> None:
     """Count, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -124,11 +190,17 @@ def main() -> None:
     parser.add_argument(
         "--table", action="store_true", help="do not say that the voltage is held between samples"
     )
+    parser.add_argument(
+        "--hidden", choices=("first", "second"), help="rigs that hide an effect, by this generator"
+    )
     parser.add_argument("--workers", type=int, default=2, help="threads of a fit [2]")
     given = parser.parse_args()
     counts: dict[str, Count] = {}
-    others = 0
-    for seed in range(given.first, given.first + given.rigs):
+    others, above = 0, []
+    seeds = range(given.first, given.first + given.rigs)
+    if given.hidden:
+        count_hidden(counts, seeds, given.hidden)
+    for seed in () if given.hidden else seeds:
         started = time.perf_counter()
         effects = EFFECTS_DRAWN[seed % len(EFFECTS_DRAWN)] if given.diagnose else ()
         model, noise = rig_of(seed, effects)
@@ -140,6 +212,7 @@ def main() -> None:
             said = f"{' + '.join(names) or 'nothing'} for {effects[0][0]}"
             if names == (effects[0][0],):
                 missed = count(counts, finding.final.estimates, truths(model))
+                above.append(above_best(record, finding.final.model, model))
             else:
                 # another law's parameters have no truth
                 others, missed = others + 1, []
@@ -147,15 +220,25 @@ def main() -> None:
             fit = identify([record], base, workers=given.workers)
             said = f"cost {fit.cost:.3f}, correlation {fit.correlation:.2f}"
             missed = count(counts, fit.estimates, truths(model))
+            above.append(above_best(record, fit.model, model))
         spent = time.perf_counter() - started
-        print(f"{seed}: {said}, missed {missed or 'none'}, {spent:.1f} s", flush=True)
+        over = f"{above[-1]:.2f}" if above else "?"
+        print(
+            f"{seed}: {said}, missed {missed or 'none'}, chi-square {over}, {spent:.1f} s",
+            flush=True,
+        )
     print("\n| parameter | held | % | 95 % of that | RMS of errors |\n|---|---|---|---|---|")
     total = Count()
     for name, one in counts.items():
         print(one.row(name))
         total.held, total.of = total.held + one.held, total.of + one.of
         total.errors += one.errors
-    print(total.row("all"))
+    if total.of:
+        print(total.row("all"))
+    if above:
+        near = sum(a <= 1.0 for a in above)
+        print(f"\nChi-square within 1 of the least from the truth: {near} of {len(above)}.")
+        print(f"The largest excess is {max(above):.2f}.")
     if others:
         print(f"\n{others} rigs were explained by another law and are not counted.")
 

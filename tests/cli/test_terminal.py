@@ -87,7 +87,7 @@ class TestTables:
         assert "[bold]x[/].h5" in shown(validate_tables(outcome))
 
     def test_long_names_are_cut_in_the_middle(self):
-        text = shown(validate_tables(validate_outcome(comparisons=(LONG,))))
+        text = shown(validate_tables(validate_outcome(comparisons=(LONG,))), 66)
         assert "a-rather-long…afternoon-7.h5" in text
 
     def test_film_is_in_kilopascals(self):

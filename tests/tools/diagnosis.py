@@ -218,7 +218,7 @@ def electric_outcome() -> DiagnoseOutcome:
                 ("permittivity", _odds(846.0, 0.0, -5.0)),
             ),
             denials=(
-                Denial("amplifier lag", "amplifier", "voltage_monitor", 177.0, 1.0, 1.0, "V"),
+                Denial("amplifier lag", "amplifier", "voltage_monitor", 177.0, 1.0, 1.0, "V", 4e3),
             ),
         ),
     )  # fmt: skip

@@ -13,6 +13,11 @@ from dearig.recording.reading.recording import Recording
 
 __all__ = ["clipped", "gaps", "outliers", "place", "spikes_about", "stuck", "where"]
 
+_LONG = 25  # readings of one value: more than noise of a fraction of a step leaves
+#: Steps by which a parabola may fall over half of its flat top beyond either end: 3 where the top
+#: is one step high, and one for the rounding and half a one for the noise.
+_FALL = 4.5
+
 
 def gaps(recording: Recording, moved: np.ndarray) -> Iterator[str]:
     """Yield a sentence for each harmless jump of time; refuse one where the film may have moved."""
@@ -51,7 +56,11 @@ def clipped(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
     """
     steps = np.abs(np.diff(signal))
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    noisy = float(np.median(np.abs(np.diff(signal, 2)))) > 0.25 * step
+    rough = np.abs(np.diff(signal, 2))
+    still = (np.diff(moved[1:]) == 0.0) & (np.diff(moved[:-1]) == 0.0)
+    # in motion rounding is rough too: the noise shows where nothing moves
+    noise = rough[still] if np.count_nonzero(still) > _LONG else rough
+    noisy = float(np.median(noise)) > 0.25 * step
     found: list[tuple[int, int]] = []
     for extreme in (float(signal.max()), float(signal.min())):
         runs = []
@@ -67,11 +76,19 @@ def clipped(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
             if right > 1:
                 slopes.append(abs(signal[b - 1] - signal[b - 1 + right]) / right)
             hidden = 0.25 * max(slopes) * moving
-            if (noisy and b - a >= 25) or hidden > 4.0 * step:
+            steep = noisy and b - a >= _LONG and _falls(signal, a, b) > _FALL * step
+            if steep or hidden > 4.0 * step:
                 runs.append((a, b))
         if sum(b - a for a, b in runs) >= 20:
             found += runs
     return sorted(found)
+
+
+def _falls(signal: np.ndarray, a: int, b: int) -> float:
+    """Return how far the signal goes over half of the run from ``a`` to ``b``, beyond an end."""
+    half = (b - a) // 2
+    sides = (signal[max(a - half, 0)], signal[min(b - 1 + half, signal.size - 1)])
+    return max(abs(float(signal[a] - side)) for side in sides)
 
 
 def stuck(time: np.ndarray, signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:

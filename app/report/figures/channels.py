@@ -98,14 +98,19 @@ def evidence_figure(
             largest = max(largest, float(values.max()))
             for place, value in zip(places, values, strict=True):
                 ax.annotate(
-                    f"{value:+,.0f}",
+                    f"{value:+,.0f}" if abs(value) >= 0.5 else "0",
                     (value, place), (3 if value >= 0.0 else -3, 0), textcoords="offset points",
                     va="center", ha="left" if value >= 0.0 else "right", fontsize=text_size(8.0),
                 )  # fmt: skip
         ax.axvline(0.0, color=base.UNSURE, linewidth=0.8)
         least = min((v for _, said in evidence for _, v in said), default=0.0)
         _evidence_axis(ax, min(least, 0.0), largest)
-        ax.set_yticks(rows, [base.drawable(family, _NAME) for family, _ in evidence])
+        # of two families each has its line
+        names = [
+            " +\n".join(base.drawable(part, _NAME) for part in family.split(" + "))
+            for family, _ in evidence
+        ]
+        ax.set_yticks(rows, names)
         ax.set_ylim(len(evidence) - 0.5, -0.5)
         ax.grid(visible=False, axis="y")
         ax.set_xlabel("Gain of the criterion over the plain model")

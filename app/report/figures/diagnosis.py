@@ -239,36 +239,41 @@ def curve_figure(curve: Curve) -> Figure:
     return figure
 
 
-def bars_figure(
-    pairs: Sequence[tuple[Comparison, Comparison]], noise: float | None, kind: str
-) -> Figure:
-    """Draw the RMS error of every recording, before and after, with the noise floor."""
+def bars_figure(pairs: Sequence[tuple[Comparison, Comparison]], kind: str) -> Figure:
+    """Draw the RMS error of every recording, before and after, with the noise floor of each.
+
+    Where both are the same there is one bar.
+    """
     shown = SHOWN[kind]
     rows = np.arange(len(pairs))
-    before = np.array([b.errors.rms for b, _ in pairs]) * shown.error_factor
-    after = np.array([a.errors.rms for _, a in pairs]) * shown.error_factor
+    sides = [("before", 0, -0.2, 0.36, BEFORE), ("after", 1, 0.2, 0.36, AFTER)]
+    if all(b is a for b, a in pairs):
+        sides = [("thesis model", 1, 0.0, 0.6, BEFORE)]
+    errors = np.array([[c.errors.rms for c in pair] for pair in pairs]) * shown.error_factor
+    floors = np.array([a.noise or 0.0 for _, a in pairs]) * shown.error_factor
     with style():
         figure = base.blank(base.WIDTH, 1.0 + 0.5 * len(pairs))
         ax = figure.subplots()
-        for values, shift, name, colour in (
-            (before, -0.2, "before", BEFORE), (after, 0.2, "after", AFTER),
-        ):  # fmt: skip
-            ax.barh(rows + shift, values, height=0.36, color=colour, label=name)
-            for row, value in zip(rows, values, strict=True):
+        for name, side, shift, height, colour in sides:
+            ax.barh(rows + shift, errors[:, side], height=height, color=colour, label=name)
+            for row, value, floor in zip(rows, errors[:, side], floors, strict=True):
+                # beside the mark of the noise, not across it
+                near = 0.0 <= floor - value < 0.12 * max(errors.max(), floor)
                 ax.annotate(
-                    significant(float(value)), (value, row + shift), (3, 0),
+                    significant(float(value)), (floor if near else value, row + shift), (4, 0),
                     textcoords="offset points", va="center", fontsize=text_size(8.5),
                 )  # fmt: skip
-        if noise is not None:
-            ax.axvline(
-                noise * shown.error_factor, color=base.MARK, linewidth=1.1,
-                linestyle=(0, (3, 2)), label="noise floor",
+        known = floors > 0.0
+        if known.any():
+            ax.vlines(
+                floors[known], rows[known] - 0.42, rows[known] + 0.42, color=base.MARK,
+                linewidth=1.3, linestyle=(0, (2, 1)), label="noise floor", zorder=4,
             )  # fmt: skip
         roles = {"train": "training", "validation": "validation"}
         names = [base.drawable(f"{a.name} ({roles[a.role]})", _NAME + 10) for _, a in pairs]
         ax.set_yticks(rows, names)
         ax.set_ylim(len(pairs) - 0.4, -0.6)
-        ax.set_xlim(0.0, 1.15 * max(float(before.max()), float(after.max())))
+        ax.set_xlim(0.0, 1.15 * max(float(errors.max()), float(floors.max())))
         ax.grid(visible=False, axis="y")
         ax.set_xlabel(f"RMS error ({shown.error_unit})")
         base.legend(ax, 3)

@@ -48,6 +48,10 @@ __all__ = [
 _NUMBERS = 6
 #: Numbers that the page draws, at most.
 _DRAWN = 8
+_CAPTION = (
+    "Numbers of the runs, each over the range of its own values. There are no intervals here: "
+    "dearig study and dearig trends tell whether a number changes by more than its uncertainty."
+)
 _SHOWN_FIRST = (
     "mu_0_kPa", "fit_rms_um", "validation_rms_um", "diagnosis_rms_um",
     "peak_displacement_mm", *CONDITIONS,
@@ -257,7 +261,7 @@ def _contents(outcome: CampaignOutcome) -> Callable[[], dict[str, Any]]:
             "summary": campaign_summary(outcome),
             "warnings": [queue.halted] if queue.halted else [],
             "runs": campaign_table(outcome),
-            "pictures": [picture(f, prefixes(), "Numbers of the runs.") for f in figures],
+            "pictures": [picture(f, prefixes(), _CAPTION) for f in figures],
             "provenance": (
                 ("Folder", (str(outcome.folder),)),
                 ("Rig", (queue.rig,)),

@@ -26,20 +26,23 @@ from dearig.report.pages.html import (
 from dearig.report.pages.laws import LawView, law_view
 from dearig.report.text.channels import channel_table, channel_title
 from dearig.report.text.diagnosis import (
+    family_label,
+    headline,
+    signatures_of,
+    step_label,
+    summary,
+    untried_text,
+    warnings,
+)
+from dearig.report.text.diagnosis_tables import (
     before_after_table,
     dropped_effects,
     experiment_table,
-    family_label,
-    headline,
     rankings,
-    signatures_of,
-    step_label,
     step_table,
-    summary,
     thesis_before_after_table,
-    warnings,
 )
-from dearig.report.text.estimates import effect_table, estimate_table
+from dearig.report.text.estimates import condition_text, effect_table, estimate_table
 from dearig.report.text.laws import place_text
 from dearig.report.text.numbers import seconds, significant
 from dearig.report.text.sentences import describe_model
@@ -101,6 +104,7 @@ class DiagnosisPage:
     residuals: tuple[RecordSection, ...]
     missing: tuple[RecordSection, ...]
     rankings: tuple[tuple[Table, Table], ...]
+    untried: str
     dropped_effects: str
     after: tuple[tuple[str, tuple[str, ...]], ...]
     after_pictures: tuple[Picture, ...]
@@ -148,13 +152,16 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         *_paired(outcome.before.train, outcome.after.train),
     ]
     bars: tuple[Picture, ...] = ()
+    if not changed:
+        pairs = [(after, after) for _, after in pairs]
+    with_effects = " (before) and with the effects found (after)" if changed else ""
     if pairs:
         bars = (
             picture(
-                drawn.bars_figure(pairs, outcome.noise, kind),
+                drawn.bars_figure(pairs, kind),
                 names,
-                "RMS error of every recording with the thesis model (before) and with the effects "
-                "found (after). An error at the noise floor is noise alone.",
+                f"RMS error of every recording with the thesis model{with_effects}. An error at "
+                f"the noise floor of its recording is noise alone.",
             ),
         )
     experiments = experiment_table(outcome)
@@ -183,6 +190,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
             if any(m.record == s.record for s in worst)
         ),
         rankings=_rankings(outcome),
+        untried=untried_text(outcome),
         dropped_effects=_capitalised(dropped_effects(outcome)),
         after=tuple(
             (s.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in s.words))
@@ -192,7 +200,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         experiment_words=readable(_with_full_stop(outcome.experiment_words)),
         experiments=() if experiments is None else (experiments,),
         sequence="" if outcome.experiment is None else outcome.experiment.sequence.strip(),
-        parameters=estimate_table(finding.final, outcome.is_rejected),
+        parameters=estimate_table(finding.final, condition_text(outcome)),
         provenance=_provenance(outcome),
         film=kind == "film",
     )
@@ -338,7 +346,8 @@ def _validation_pictures(
     for before, after in _paired(outcome.before.validation, outcome.after.validation)[
         :_VALIDATION_MAX
     ]:
-        label = f"{after.name} ({after.row})" if after.row else after.name
+        named = after.row and after.row != after.name
+        label = f"{after.name} ({after.row})" if named else after.name
         last = f"{significant(after.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
         if not changed:
             caption = f"{label}: {last}.{band_caption(after)}"

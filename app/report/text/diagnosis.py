@@ -1,44 +1,35 @@
-"""Sentences and tables of a diagnosis, for the terminal, the window and the HTML page."""
+"""Sentences of a diagnosis, for the terminal, the window and the HTML page."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
-from dearig.model.verdict import NOT_CONFIRMED, TOLERANCE
+from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, TOLERANCE
 from dearig.report.text.excitation import tested_texts, undetermined_texts
 from dearig.report.text.laws import place_text
-from dearig.report.text.numbers import NO_VALUE, seconds, significant
+from dearig.report.text.numbers import significant
 from dearig.report.text.sentences import few_data_text, listed, undetermined_names_text
-from dearig.report.text.tables import Row, Table
 from dearig.units import SHOWN, readable
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, Evaluation
-    from dearig.model.diagnosis.results import Round, Step
-    from dearig.model.readings.measures import Errors
+    from dearig.model.diagnosis.channels import Denial
+    from dearig.model.diagnosis.results import Stage, Step
     from dearig.model.residual import Signature
 
 __all__ = [
     "HEADLINES",
-    "before_after_table",
-    "dropped_effects",
-    "experiment_table",
     "family_label",
     "headline",
-    "pooled_errors",
-    "ranking_table",
-    "rankings",
+    "selection_rms",
     "signatures_of",
     "step_label",
-    "step_table",
     "summary",
-    "thesis_before_after_table",
+    "untried_text",
     "warnings",
 ]
 
@@ -60,35 +51,16 @@ _LOWERED = {
 }
 
 
-def pooled_errors(comparisons: Sequence[Comparison]) -> Errors | None:
-    """Return the errors over all samples of all recordings; None without recordings.
+def selection_rms(stage: Stage, train: Sequence[Comparison]) -> float:
+    """Return the cross-validation error of a ``stage``, in m or Pa, as errors are counted.
 
-    Relative errors refer to the range (or peak) of all recordings together, so that a recording
-    with a small range does not dominate.
+    A fit has a zero of its own for each recording; the errors of a recording are those of its
+    readings as they are. What that adds to the ``train`` recordings is added here too.
     """
-    from dearig.model.readings.measures import Errors
-
-    if not comparisons:
-        return None
-    rms = pooled_rms(comparisons)
-    largest = max(c.errors.max for c in comparisons)
-    tops = [(np.nanmin(c.measured), np.nanmax(c.measured)) for c in comparisons]
-    span = max(t[1] for t in tops) - min(t[0] for t in tops)
-    peak = max(abs(end) for ends in tops for end in ends)
-    model_span = max(c.model.max() for c in comparisons) - min(c.model.min() for c in comparisons)
-
-    def per_cent(value: float, of: float) -> float:
-        return 100.0 * value / of if of > 0.0 else math.inf
-
-    return Errors(
-        rms=rms,
-        nrmse_pct=per_cent(rms, float(span)),
-        max=largest,
-        peak_pct=per_cent(rms, float(peak)),
-        e_rms_thesis_pct=rms * 1e3 * 100.0,
-        e_m_thesis_pct=per_cent(largest, float(model_span)),
-        samples=sum(c.errors.samples for c in comparisons),
-    )
+    if not train:
+        return stage.selection_rms
+    zero = pooled_rms(train) ** 2 - stage.train_rms**2
+    return math.sqrt(max(stage.selection_rms**2 + zero, 0.0))
 
 
 def signatures_of(
@@ -151,6 +123,8 @@ def headline(outcome: DiagnoseOutcome) -> str:
     return "; ".join([said or HEADLINES[judgement.verdict], *limits])
 
 
+_NOT_EXCLUDED = 0.1  # probability from which on a family that is not named is mentioned
+
 _STATUS = {
     "stopped": "the search was stopped",
     "budget": "the search ended at its computing budget",
@@ -191,7 +165,9 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     said += _sureness(outcome)
     said += _undetermined(outcome)
     said += _events(outcome)
-    said += [_rivals_text(step) for step in finding.steps if step.indistinguishable_from]
+    said += [
+        _rivals_text(step, finding.denials) for step in finding.steps if step.indistinguishable_from
+    ]
     if finding.unnamed is not None:
         said.append(_unnamed(outcome))
     said += outcome.performed
@@ -224,7 +200,7 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
             f"{listed(left)}."
         )
         yield from undetermined_texts(outcome)
-    elif outcome.prediction_errors and any(
+    elif outcome.verdict == NOTHING_MISSING and any(
         c.over_noise(outcome.noise) > TOLERANCE for c in outcome.after.validation
     ):
         yield (
@@ -233,7 +209,8 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
         )
     if "selection" in reasons:
         before, after = (
-            significant(stage.selection_rms * shown.error_factor) for stage in (baseline, final)
+            significant(selection_rms(stage, stand.train) * shown.error_factor)
+            for stage, stand in ((baseline, outcome.before), (final, outcome.after))
         )
         yield (
             f"The cross-validation error rises from {before} to {after} {shown.error_unit}: the "
@@ -289,10 +266,14 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
     if judgement.reasons:
         return f"{lacks}, as far as the training recordings show."
     if judgement.verdict == "nothing_missing":
+        tried = (
+            "and no effect that was tried improves it by more than chance"
+            if finding.rounds
+            else f"and what it leaves {_like(outcome)}, so that no effect was tried"
+        )
         return (
             f"The thesis model explains these recordings down to the noise"
-            f"{_film_tolerance(outcome) or ','} and no other effect improves it by more than "
-            f"chance."
+            f"{_film_tolerance(outcome) or ','} {tried}."
         )
     if judgement.verdict == "explained":
         return f"{lacks}. With {_them(names)}, only noise{_film_tolerance(outcome)} is left."
@@ -304,6 +285,18 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
     helps = "helps" if len(names) == 1 else "help"
     tried = f" {listed(names)} {helps}, but only a little." if names else ""
     return f"The residual is more than noise, and no known effect explains it.{tried}"
+
+
+def untried_text(outcome: DiagnoseOutcome) -> str:
+    """Return why there is no round of candidates."""
+    if outcome.finding.interrupted:
+        return "The search was stopped before a round of candidates was complete."
+    return f"No effect was tried: what the thesis model leaves {_like(outcome)}."
+
+
+def _like(outcome: DiagnoseOutcome) -> str:
+    looks = all(s.is_noise for s in outcome.finding.after)
+    return "looks like noise" if looks else "is too small to tell its cause"
 
 
 def _they(names: list[str]) -> str:
@@ -357,8 +350,16 @@ def _error_change(
 def _sureness(outcome: DiagnoseOutcome) -> list[str]:
     """Return how probable each family of the effects found is, where that is known."""
     known, families = outcome.marginals, dict.fromkeys(s.family for s in outcome.finding.steps)
-    said = "The probability that {} is among what is missing is {:.2f}."
-    return [said.format(family_label(f), known.get(f, 0.0)) for f in families if known]
+    text = "The probability that {} is among what is missing is {:.2f}."
+    said = [text.format(family_label(f), known.get(f, 0.0)) for f in families if known]
+    others = [
+        f"{family_label(f)} ({p:.2f})"
+        for f, p in known.items()
+        if families and p >= _NOT_EXCLUDED and f not in families and f != "none"
+    ]
+    if others:
+        said.append(f"Not excluded: {listed(others)}.")
+    return said
 
 
 def _undetermined(outcome: DiagnoseOutcome) -> Iterator[str]:
@@ -386,12 +387,19 @@ def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
         yield f"In {c.name} there is {what}: other recordings are predicted without it.{left}"
 
 
-def _rivals_text(step: Step) -> str:
-    return (
+def _rivals_text(step: Step, denials: Sequence[Denial]) -> str:
+    said = (
         f"These data cannot separate {step.effect} from "
         f"{listed(family_label(f) for f in step.indistinguishable_from)}: each explains them "
         f"equally well."
     )
+    denied = {d.family for d in denials if d.is_of_monitor} & set(step.indistinguishable_from)
+    if denied:
+        said += (
+            " A fault of the amplifier would be behind the point that its monitor reads: a "
+            "measurement of the voltage at the film would tell."
+        )
+    return said
 
 
 def _unnamed(outcome: DiagnoseOutcome) -> str:
@@ -415,185 +423,3 @@ def warnings(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     for comparison in (*outcome.after.train, *outcome.after.validation):
         said += [f"{comparison.name}: {w}" for w in comparison.warnings]
     return tuple(dict.fromkeys(readable(_sentence(w)) for w in said))
-
-
-def _pairs(
-    before: Sequence[Comparison], after: Sequence[Comparison]
-) -> list[tuple[str, Errors, Errors, float | None]]:
-    """Return (name, errors before, errors after, noise) of every recording and of all pooled."""
-    first = {c.name: c for c in before}
-    rows = [
-        (c.marked_name, first[c.name].errors, c.errors, c.noise) for c in after if c.name in first
-    ]
-    if len(rows) > 1:
-        one, two = pooled_errors(before), pooled_errors(after)
-        noise = pooled_noise([c for c in after if c.name in first])
-        if one is not None and two is not None:
-            rows.append(("all", one, two, noise))
-    return rows
-
-
-def before_after_table(
-    title: str, before: Sequence[Comparison], after: Sequence[Comparison], kind: str
-) -> Table:
-    """Return RMS, NRMSE and RMS over noise of every recording, before and after."""
-    shown, film = SHOWN[kind], kind == "film"
-    rows = []
-    for name, one, two, noise in _pairs(before, after):
-        both = (one, two)
-        cells = [
-            name,
-            *(significant(e.rms * shown.error_factor) for e in both),
-            *(significant(e.peak_pct if film else e.nrmse_pct) for e in both),
-            *(significant(e.rms / noise) if noise else NO_VALUE for e in both),
-        ]
-        rows.append(Row(tuple(cells), mark=name == "all"))
-    relative = "RMS %" if film else "NRMSE %"
-    head = (
-        ("", ""),
-        (f"RMS {shown.error_unit}", "before"), ("", "after"),
-        (relative, "before"), ("", "after"),
-        ("RMS / noise", "before"), ("", "after"),
-    )  # fmt: skip
-    return Table(title, head, tuple(rows))
-
-
-def thesis_before_after_table(
-    title: str, before: Sequence[Comparison], after: Sequence[Comparison], kind: str
-) -> Table:
-    """Return the thesis's measures and the largest error of every recording, before and after."""
-    shown, film = SHOWN[kind], kind == "film"
-    rows = []
-    for name, one, two, _ in _pairs(before, after):
-        cells = [name]
-        if not film:
-            cells += [significant(e.e_rms_thesis_pct) for e in (one, two)]
-        cells += [significant(e.e_m_thesis_pct) for e in (one, two)]
-        cells += [significant(e.max * shown.error_factor) for e in (one, two)]
-        rows.append(Row(tuple(cells), mark=name == "all"))
-    head = [("", "")]
-    if not film:
-        head += [("e_rms %", "before"), ("", "after")]
-    head += [("e_m %", "before"), ("", "after")]
-    head += [(f"Max {shown.error_unit}", "before"), ("", "after")]
-    return Table(title, tuple(head), tuple(rows))
-
-
-def step_table(outcome: DiagnoseOutcome) -> Table:
-    """Return the errors of the model after each step: training, selection and validation."""
-    shown, finding = SHOWN[outcome.kind], outcome.finding
-    stages = [finding.baseline, *(s.stage for s in finding.steps)]
-    names = ["thesis model", *(f"+ {s.effect}" for s in finding.steps)]
-    rows = []
-    for i, (name, stage) in enumerate(zip(names, stages, strict=True)):
-        stand = outcome.stands[i] if i < len(stages) - 1 else outcome.after
-        if i == 0:
-            stand = outcome.before
-        fitted, errors = pooled_errors(stand.train), pooled_errors(stand.validation)
-        noise = pooled_noise(stand.validation) or outcome.noise
-        rows.append(
-            Row(
-                (
-                    name,
-                    NO_VALUE if fitted is None else significant(fitted.rms * shown.error_factor),
-                    significant(stage.selection_rms * shown.error_factor),
-                    NO_VALUE if errors is None else significant(errors.rms * shown.error_factor),
-                    NO_VALUE if errors is None else significant(errors.rms / noise),
-                ),
-                mark=i == len(stages) - 1 and i > 0,
-            )
-        )
-    head = (
-        ("Model", ""), ("Training", shown.error_unit), ("Selection", shown.error_unit),
-        ("Validation", shown.error_unit), ("Validation", "/ noise"),
-    )  # fmt: skip
-    note = (
-        "RMS errors. Training: recordings that were fitted. Selection: time segments of the "
-        "training recordings, each predicted by a fit to the others. Validation: other "
-        "recordings, compared once at the end."
-    )
-    return Table("Step by step", head, tuple(rows), note)
-
-
-_VERDICTS = {
-    "chosen": "chosen",
-    "indistinguishable": "not separable",
-    "better": "explains less",
-    "worthless": "no better than chance",
-    "failed": "fit failed",
-}
-
-
-def ranking_table(found: Round, kept: Collection[str], longest: int | None = None) -> Table:
-    """Return the candidates of one round, best first; ``kept`` are the effects of the final model.
-
-    A candidate that was chosen and later replaced is not marked as chosen. With ``longest`` the
-    table has at most so many rows, and fewer columns for a terminal.
-    """
-    brief = longest is not None
-    base = f"on top of {listed(found.base)}" if found.base else "on top of the thesis model"
-    rows = []
-    for c in found.candidates[:longest]:
-        cells = [c.effect]
-        if not brief:
-            cells.append(family_label(c.family))
-        cells.append(_share(c.gained))
-        if not brief:
-            cells += [_share(c.promised), significant(c.gain, 3)]
-        chosen = c.verdict == "chosen" and c.effect in kept
-        verdict = "replaced later" if c.verdict == "chosen" and not chosen else c.verdict
-        cells += [significant(c.behind, 3), _VERDICTS.get(verdict, verdict)]
-        idle = c.verdict in ("worthless", "failed")
-        rows.append(Row(tuple(cells), c.note, idle, chosen))
-    head = [("Effect", ""), ("Explains", "%"), ("Behind", "best"), ("Verdict", "")]
-    if not brief:
-        head[1:1] = [("Family", "")]
-        head[3:3] = [("Predicted", "%"), ("Gain", "")]
-    rest = len(found.candidates) - len(rows)
-    note = _sentence(found.reason[:1].upper() + found.reason[1:]) if found.reason else ""
-    if rest:
-        note = f"{note} {rest} more candidates are worse."
-    return Table(f"Candidates {base}", tuple(head), tuple(rows), note.strip())
-
-
-def _share(of_one: float) -> str:
-    """Return a share in percent, with one decimal."""
-    return f"{100.0 * max(of_one, 0.0):.1f}"
-
-
-def rankings(outcome: DiagnoseOutcome, longest: int | None = None) -> tuple[Table, ...]:
-    """Return the table of each round, see ``ranking_table``."""
-    kept = {s.effect for s in outcome.finding.steps}
-    return tuple(ranking_table(found, kept, longest) for found in outcome.finding.rounds)
-
-
-def dropped_effects(outcome: DiagnoseOutcome) -> str:
-    """Return a sentence on effects that were chosen and later removed; empty without any."""
-    finding = outcome.finding
-    kept = {s.effect for s in finding.steps}
-    gone = dict.fromkeys(r.chosen for r in finding.rounds if r.chosen and r.chosen not in kept)
-    if not gone or not kept:
-        return ""
-    was = "was the best single effect but is" if len(gone) == 1 else "were chosen first but are"
-    it = "it adds" if len(gone) == 1 else "they add"
-    return (
-        f"{listed(gone)} {was} not in the final model: {listed(kept)} together explain more, and "
-        f"{it} nothing to them."
-    )
-
-
-def experiment_table(outcome: DiagnoseOutcome) -> Table | None:
-    """Return the excitations that were considered, the best first; None without any."""
-    experiment = outcome.experiment
-    if experiment is None:
-        return None
-    rows = tuple(
-        Row((name, significant(apart), seconds(duration)), mark=name == experiment.name)
-        for name, apart, duration in experiment.tried
-    )
-    head = (("Excitation", ""), ("Separation", "/ noise"), ("Duration", ""))
-    note = (
-        "Separation: RMS difference between the predictions of the two most similar rivals, "
-        "divided by the noise floor."
-    )
-    return Table("Excitations considered", head, rows, note)

@@ -24,13 +24,28 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.results import Stage
     from dearig.model.fitting import Contribution, Estimate
 
-__all__ = ["CONDITIONAL_TEXT", "effect_table", "estimate_table"]
+__all__ = ["CONDITIONAL_TEXT", "UNTESTED_TEXT", "condition_text", "effect_table", "estimate_table"]
 
 #: Note of intervals under a model that leaves more than noise.
 CONDITIONAL_TEXT = (
     "These data reject the model: the intervals hold only if it were right, and the true values "
     "can lie outside."
 )
+#: The same where nothing rejects the model, and not everything tests it.
+UNTESTED_TEXT = (
+    "Nothing rejects the model, but these data do not test all of it: the intervals hold only if "
+    "it is right."
+)
+#: Reasons against a better verdict that reject no model.
+_UNTESTED = {"excitation", "rest", "stopped"}
+
+
+def condition_text(outcome: DiagnoseOutcome) -> str:
+    """Return under which condition the intervals of ``outcome`` hold; "" under none."""
+    if not outcome.is_rejected:
+        return ""
+    untested = _UNTESTED & set(outcome.judgement.reasons)
+    return UNTESTED_TEXT if untested else CONDITIONAL_TEXT
 
 
 def effect_table(outcome: DiagnoseOutcome) -> Table:
@@ -38,25 +53,29 @@ def effect_table(outcome: DiagnoseOutcome) -> Table:
     from dearig.model.effects import EFFECTS
 
     final, rows = outcome.finding.final, []
+    alone = len(outcome.finding.steps) == 1
     for step in outcome.finding.steps:
         meanings = {p.name: p.meaning for p in EFFECTS[step.effect].parameters}
         for e in step.estimates:
             about = meanings.get(e.name.split(" in ")[0], "")  # may be a parameter of one recording
             detail = "; ".join(w for w in (about, _note(e)) if w)
-            name = f"{step.effect}: {e.name.replace('_', ' ')}"
+            name = e.name.replace("_", " ")
+            name = name if alone else f"{step.effect}: {name}"
             rows.append(_estimate(e, name, detail, bool(final.budget)))
     shown = [e for step in outcome.finding.steps for e in step.estimates]
-    rejected = outcome.is_rejected
-    return _estimates("Fitted parameters", rows, shown, final.budget, rejected)
+    title = "Fitted parameters"
+    if alone:
+        title += f" of {outcome.finding.steps[0].effect}"
+    return _estimates(title, rows, shown, final.budget, condition_text(outcome))
 
 
-def estimate_table(stage: Stage, rejected: bool = False) -> Table:
-    """Return all parameters of a model, which the data may have ``rejected``."""
+def estimate_table(stage: Stage, condition: str = "") -> Table:
+    """Return all parameters of a model, whose intervals hold under a ``condition``."""
     rows = [
         _estimate(e, symbol(e.name).replace("_", " "), _note(e), bool(stage.budget))
         for e in (*stage.estimates, *stage.sums)
     ]
-    return _estimates("Parameters", rows, stage.estimates, stage.budget, rejected)
+    return _estimates("Parameters", rows, stage.estimates, stage.budget, condition)
 
 
 def _estimates(
@@ -64,15 +83,15 @@ def _estimates(
     rows: Sequence[Row],
     shown: Sequence[Estimate],
     budget: Sequence[Contribution],
-    rejected: bool,
+    condition: str,
 ) -> Table:
     head = [
         ("", ""),
         ("Value", ""),
         ("Unit", ""),
-        ("95 % interval", "if right" if rejected else ""),
+        ("95 % interval", "if right" if condition else ""),
     ]
-    notes = [CONDITIONAL_TEXT] if rejected and rows else []
+    notes = [condition] if condition and rows else []
     if budget and rows:
         head += BUDGET_HEAD
         notes.append(budget_text(budget))

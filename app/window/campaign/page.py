@@ -56,6 +56,7 @@ from dearig.window.session.text_file import EditedFile
 __all__ = ["CampaignPage"]
 
 _LEFT = 330  # px, default width of the left column
+_ROWS = [2000, 3000]  # shares of the table, and of the curves of a run
 _BLOCK = "campaign"  # of the session
 #: Entries of the journal after which a campaign may be between two runs.
 _BETWEEN = ("recorded", "ended", "not-started", "request")
@@ -297,7 +298,10 @@ class CampaignPage(Page):
     def _run_began(self, live: Live) -> None:
         """Show a run that has begun, here and on the page Run."""
         run = self._queue.running
+        opens = self.present_run.isHidden()
         self.present_run.follow(live)
+        if opens:
+            self.rows.setSizes(_ROWS)
         self.watch_run.emit(live, "a run of the campaign" if run is None else run.name)
 
     @Slot(object, bool)
@@ -585,9 +589,10 @@ class CampaignPage(Page):
         self.table = CampaignTable(self._session)
         self.controls = CampaignControls(self._runner.status)
         self.present_run = PresentRun(self._session, self._runner.status, self.controls)
+        self.rows = splitter(Qt.Orientation.Vertical, self.table, self.present_run, growing=0)
         return result_side(
             self.headline, (self.open_button, self.new_button, self.report_button),
             (self.summary, self.message),
-            splitter(Qt.Orientation.Vertical, self.table, self.present_run, growing=0),
+            self.rows,
             self.controls,
         )  # fmt: skip

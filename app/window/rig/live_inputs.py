@@ -21,7 +21,7 @@ from dearig.errors import DearigError
 from dearig.output_state import Known, OutputState
 from dearig.report.text.numbers import significant
 from dearig.window.kit.theme import SPACE
-from dearig.window.kit.widgets import Message, button
+from dearig.window.kit.widgets import Message, button, number_text
 from dearig.window.plots.area import PlotArea
 from dearig.window.run.channel_plots import ChannelPlots
 from dearig.window.run.traces import Newest, Pyramid
@@ -228,7 +228,9 @@ class LiveInputs(QWidget):
             for column, text in enumerate((signal.label, "—", "—")):
                 item = QTableWidgetItem(text)
                 if column:
-                    item.setTextAlignment(Qt.AlignmentFlag.AlignRight)
+                    item.setTextAlignment(
+                        Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+                    )
                 self.table.setItem(row, column, item)
         self._fit_table()
         self._silence.start()
@@ -280,7 +282,7 @@ class LiveInputs(QWidget):
     def _show_values(self, place: int, value: float, noise: float) -> None:
         signal = self.signals[place]
         shown = signal.shown
-        text = f"{(value - shown.zero) * shown.factor:.4f} {shown.unit}".strip()
+        text = f"{number_text((value - shown.zero) * shown.factor, 4)} {shown.unit}".strip()
         if signal.at_end:
             text = f"▲ end of range, {text}"
         spread = f"{significant(noise * shown.noise_factor, 2)} {shown.noise_unit}".strip()

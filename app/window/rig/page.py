@@ -416,9 +416,9 @@ class RigPage(Page):
         self.findings.setAccessibleName("Results of the check")
         header = self.findings.horizontalHeader()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        # px; both wrap, since the result needs the room most
-        header.resizeSection(1, 120)
-        header.resizeSection(2, 170)
+        header.resizeSection(1, 120)  # px; a longer name wraps
+        # the result, which says what to do, has as much room as what it is about
+        header.setSectionResizeMode(2, QHeaderView.ResizeMode.Stretch)
         header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
         self.findings.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         results.addWidget(self.findings, 1)

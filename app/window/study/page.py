@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Slot
+from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -68,6 +69,9 @@ class StudyPage(Page):
         self._library = shared_library(session)
         self._worker = Worker(self)
         self._shown: StudyView | None = None
+        self._parts: list[Callable[[], None]] = []  # of the result, not yet on their tabs
+        self._next_part = QTimer(self, singleShot=True, interval=0)
+        self._next_part.timeout.connect(self._show_part)
         self._listing = Background(self)
         self._listing.done.connect(self._list_studies)
         self._listing.failed.connect(self._show_trouble)
@@ -308,13 +312,20 @@ class StudyPage(Page):
         self.find_studies()
 
     def show_view(self, shown: StudyView) -> None:
-        """Show a result, new or reopened."""
+        """Show a result, new or reopened; while the rig is busy, one tab after another."""
         self._shown = shown
-        self.residual.show_residuals(shown.residuals)
-        self.curves.show_pairs(shown.pairs)
         self.verdict.show_pieces(list(shown.result), shown.warnings)
-        self.ranking.show_pieces(list(shown.ranking))
-        self.experiment.show_pieces(list(shown.experiment))
+        self._parts = [
+            lambda: self.residual.show_residuals(shown.residuals),
+            lambda: self.curves.show_pairs(shown.pairs),
+            lambda: self.ranking.show_pieces(list(shown.ranking)),
+            lambda: self.experiment.show_pieces(list(shown.experiment)),
+        ]
+        if self._session.busy:
+            self._next_part.start()  # STOP is heard in between
+        else:
+            while self._parts:
+                self._parts.pop(0)()
         for page in (self.ranking, self.experiment):
             self.tabs.setTabVisible(self.tabs.indexOf(page), shown.diagnosed)
         for index in range(self.tabs.count()):
@@ -326,6 +337,13 @@ class StudyPage(Page):
         self.about.show()
         self.tabs.setCurrentWidget(self.verdict)
         self._enable()
+
+    @Slot()
+    def _show_part(self) -> None:
+        if self._parts:
+            self._parts.pop(0)()
+        if self._parts:
+            self._next_part.start()
 
     def _label_previous(self) -> None:
         """Label the result on the page as the previous one; a new study begins."""

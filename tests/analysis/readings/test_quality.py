@@ -80,10 +80,18 @@ class TestGood:
         look = Readings(open_recording(tmp_path / "run.h5")).quality
         assert (look.valid, look.findings) == (None, ())
 
-    def test_coarse_steps_are_not_a_stuck_sensor(self, keep):
+    @pytest.mark.parametrize(("coarse", "converter"), [(20e-6, 20e-6), (6e-6, 1.22e-6)])
+    def test_coarse_steps_are_neither_a_stuck_sensor_nor_a_clipped_one(
+        self, keep, coarse, converter
+    ):
         values = lobes()
-        values["displacement"] = np.round(values["displacement"] / 20e-6) * 20e-6
-        assert Readings(keep(values)).quality.valid is None
+        smooth = 0.5e-3 * (values["voltage_command"] / 6e3) ** 2
+        values["displacement"] = 0.5 * (values["displacement"] + smooth)  # half of the noise
+        for step in (coarse, converter):
+            values["displacement"] = np.round(values["displacement"] / step) * step
+        said = " ".join(Readings(keep(values)).quality.findings)
+        assert "stuck" not in said
+        assert "clipped" not in said
 
     def test_a_step_of_the_voltage_is_not_a_dropout(self, keep):
         values = lobes()

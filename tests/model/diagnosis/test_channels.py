@@ -14,7 +14,9 @@ from dearig.model.fitting.channels import Channels, JointProblem
 from dearig.model.fitting.slow_noise import WhitenedProblem
 from dearig.model.readings.channels import CURRENT, VOLTAGE_MONITOR
 from dearig.model.readings.records import ActuatorRecord
+from tests.model.diagnosis.test_evidence import fit
 from tests.model.fitting.test_channels import ELECTRODE, LAG, LEAK, PLAIN, SATURATION, record
+from tests.tools.engine import typical
 
 
 def evidence_of(made):
@@ -81,6 +83,21 @@ def test_a_true_resistance_of_the_electrodes_is_not_denied():
     assert evidence.denied(with_(ELECTRODE)) is None
     assert evidence.total(with_(ELECTRODE)) < 0.0
     assert evidence.total(with_(LAG)) > 1e3
+
+
+def test_a_fault_that_the_monitor_does_not_show_has_its_share_of_the_probability():
+    baseline = fit(PLAIN, 4.0)
+    judge = Judge(DiagnosisSettings(), baseline, Channels([record()], PLAIN))
+    field = fit(with_((typical("field-dependent permittivity"),)), 1.0)
+    bent, worse = (fit(with_(SATURATION), cost) for cost in (0.98, 1.5))
+    assert judge.is_denied(bent)
+    assert judge.probabilities([baseline, field, bent])["amplifier"] == pytest.approx(0.0)
+    unseen = judge.unseen(bent, "amplifier saturation", field)
+    shares = judge.probabilities([baseline, field, unseen])
+    assert shares["amplifier"] == pytest.approx(0.25 * shares["permittivity"])
+    assert judge.ranked([unseen, field])[0] is field
+    far = judge.unseen(worse, "amplifier saturation", field)
+    assert judge.probabilities([baseline, field, far])["amplifier"] < 0.01
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-6])

@@ -10,10 +10,12 @@ import pytest
 from dearig.report.as_json import diagnosis_json
 from dearig.report.pages.diagnosis import write_diagnosis_report
 from dearig.report.text.diagnosis import (
-    before_after_table,
     signatures_of,
-    step_table,
     summary,
+)
+from dearig.report.text.diagnosis_tables import (
+    before_after_table,
+    step_table,
 )
 from dearig.report.text.numbers import significant
 from tests.tools.diagnosis import diagnose_outcome, finding, signature

@@ -6,7 +6,12 @@ import pytest
 
 from dearig.report.as_json import diagnosis_json
 from dearig.report.text.diagnosis import summary
-from dearig.report.text.estimates import CONDITIONAL_TEXT, effect_table, estimate_table
+from dearig.report.text.estimates import (
+    CONDITIONAL_TEXT,
+    condition_text,
+    effect_table,
+    estimate_table,
+)
 from tests.tools.diagnosis import diagnose_outcome, finding
 
 
@@ -45,7 +50,7 @@ def test_intervals_under_a_model_that_the_data_reject_are_marked(verdict, reject
     assert diagnosis_json(outcome)["intervals_conditional"] is rejected
     for table in (
         effect_table(outcome),
-        estimate_table(outcome.finding.final, outcome.is_rejected),
+        estimate_table(outcome.finding.final, condition_text(outcome)),
     ):
         assert (CONDITIONAL_TEXT in table.note) is rejected
         assert (("95 % interval", "if right") in table.head) is rejected

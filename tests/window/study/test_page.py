@@ -68,6 +68,19 @@ def words(widget: QWidget) -> str:
     return "\n".join(label.text() for label in widget.findChildren(QLabel))
 
 
+def test_a_result_that_arrives_during_a_run_is_shown_tab_after_tab(session, keep, qtbot, tmp_path):
+    page = open_page_without_recordings(session, keep)
+    outcome = diagnose_outcome(title="bench")
+    view = view_of(study_on_paper(tmp_path / "study-1", outcome))
+    session.set_armed(True)
+    page.show_view(view)
+    assert page.headline.text() == view.headline
+    assert words(page.verdict)
+    assert not words(page.ranking)  # STOP is heard before
+    qtbot.waitUntil(lambda: bool(words(page.experiment)))
+    assert words(page.ranking)
+
+
 def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path):
     low, high = made(session.folder, "low", 4.0), made(session.folder, "high", 7.0)
     page = open_page(session, keep, qtbot)
