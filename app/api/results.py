@@ -31,7 +31,12 @@ from dearig.report.pages.page import write_report
 from dearig.report.text import diagnosis as words
 from dearig.report.text.diagnosis_tables import before_after_table
 from dearig.report.text.estimates import effect_table
-from dearig.report.text.sentences import identify_summary, validate_summary, warnings_of
+from dearig.report.text.sentences import (
+    fit_is_rejected,
+    identify_summary,
+    validate_summary,
+    warnings_of,
+)
 from dearig.report.text.tables import error_table, parameter_table
 
 if TYPE_CHECKING:
@@ -185,7 +190,7 @@ class IdentifyResult(_Reported):
         every = self._comparisons
         return card(
             f"Identification: {outcome.title}",
-            table_html(parameter_table(outcome.fit)),
+            table_html(parameter_table(outcome.fit, fit_is_rejected(outcome))),
             table_html(error_table("", every)),
             drawing(self.plot(outcome.train[0].name), f"Measurement and model, {outcome.title}"),
             sentences=[*identify_summary(outcome)[1:], *self.warnings],

@@ -29,7 +29,13 @@ from dearig.report.text.diagnosis_tables import (
 from dearig.report.text.estimates import effect_table
 from dearig.report.text.laws import bounds_table, effect_named, law_lines, place_text
 from dearig.report.text.numbers import to_ascii
-from dearig.report.text.sentences import identify_summary, listed, validate_summary, warnings_of
+from dearig.report.text.sentences import (
+    fit_is_rejected,
+    identify_summary,
+    listed,
+    validate_summary,
+    warnings_of,
+)
 from dearig.report.text.tables import (
     Table,
     branch_trials,
@@ -83,7 +89,7 @@ def identify_table(outcome: IdentifyOutcome) -> RenderableType:
     return _Fitted(
         [
             *identify_summary(outcome),
-            parameter_table(outcome.fit),
+            parameter_table(outcome.fit, fit_is_rejected(outcome)),
             *_errors("Training", outcome.train, published),
             *_grouped("Validation", outcome.validation),
             *_channels((*outcome.train, *outcome.validation)),

@@ -135,7 +135,7 @@ def _diagnosis(outcome: DiagnoseOutcome) -> dict[str, Any]:
 def _fit(outcome: IdentifyOutcome) -> dict[str, Any]:
     pieces: list[str | Table] = [
         *sentences.identify_summary(outcome),
-        tables.parameter_table(outcome.fit),
+        tables.parameter_table(outcome.fit, sentences.fit_is_rejected(outcome)),
         tables.error_table("Training", outcome.train),
     ]
     if outcome.validation:

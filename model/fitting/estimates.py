@@ -19,7 +19,7 @@ from dearig.model.fitting.intervals import (
 from dearig.model.fitting.levenberg import descend, gain_that_counts
 from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
-from dearig.model.fitting.spare import Optimum, sums_of_weak, valleys_of, widened
+from dearig.model.fitting.spare import OPEN, Optimum, sums_of_weak, valleys_of, widened
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
 __all__ = [
@@ -224,7 +224,7 @@ def _estimate(
     determined = is_determined(low, high) and not at_end
     note = "" if determined else _open_text(low, high)
     if held:
-        note = _J_WORDS if low > 0.0 else "not determined by these data"
+        note = _J_WORDS if low > 0.0 else OPEN
     elif at_end:
         note = end_text(q, value)
     elif not followed:
@@ -276,7 +276,7 @@ def _open_text(low: float, high: float) -> str:
     if low < 0.0 < high:
         return "not distinguishable from 0 with these data"
     if low == 0.0 and math.isinf(high):
-        return "not determined by these data"
+        return OPEN
     if math.isinf(high):
         return "only a lower bound"
     if low == 0.0:

@@ -28,10 +28,21 @@ from dearig.model.fitting.parameters import Estimate, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import resolved_times
 
-__all__ = ["SPARE", "Optimum", "Valleys", "sums_of_weak", "sums_text", "valleys_of", "widened"]
+__all__ = [
+    "OPEN",
+    "SPARE",
+    "Optimum",
+    "Valleys",
+    "sums_of_weak",
+    "sums_text",
+    "valleys_of",
+    "widened",
+]
 
 #: Note of a parameter of a branch that may be two, or none.
 SPARE = "only the sum of several branches is determined"
+#: Note of a parameter of which nothing is determined.
+OPEN = "not determined by these data"
 
 _ITERATIONS = 60  # of a descent into another valley
 _GAIN = 0.01  # of the threshold of an interval, at which it ends
@@ -287,6 +298,8 @@ def widened(
     except end:
         sums = {}
     most = max((high for _, high in sums.values()), default=math.inf)
+    # a sum that is not determined either says nothing
+    sums = {branch: span for branch, span in sums.items() if is_determined(*span)}
     changed = []
     for e in estimates:
         j = layout.names.index(e.name)
@@ -294,7 +307,7 @@ def widened(
         if j in parts and not held[j] and e.constraint is None:
             # a part that is faster than the records show may be larger than any sum
             high = max(most, e.high) if layout.quantities[j].kind == "mu" else math.inf
-            note = e.note if e.at_bound else SPARE
+            note = e.note if e.at_bound else SPARE if sums else OPEN
             changed.append(replace(e, low=0.0, high=high, determined=False, note=note))
         else:
             determined = e.determined and is_determined(low, high)

@@ -155,6 +155,8 @@ def _undetermined(said: Said) -> Iterator[str]:
     for total in said.json.get("sums", ()):
         parts = total["name"].split(" + ")
         known = {p["name"]: p["determined"] for p in said.json["parameters"]}
+        if not total["determined"]:
+            yield f"the sum {total['name']} is said to be determined, and is not"
         if all(known.get(part, False) for part in parts):
             yield f"the sum {total['name']} is shown, and all of its parts are determined"
 
@@ -396,5 +398,5 @@ def _fit(said: Said) -> Iterator[str]:
     counted = re.search(r"(\d+) free parameters?", said.text)
     if counted and int(counted[1]) != free:
         yield f"{counted[1]} free parameters in the text, {free} in JSON"
-    if rejected and "if right" not in said.text and "only if" not in said.text:
+    if j["rejected"] and "if right" not in said.text:
         yield "the model is rejected, and its intervals are not marked"

@@ -36,6 +36,7 @@ from dearig.report.text.channels import channel_errors, channel_title
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
 from dearig.report.text.sentences import (
     describe_model,
+    fit_is_rejected,
     identify_summary,
     validate_summary,
     warnings_of,
@@ -363,7 +364,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         channels=_channel_tables((*outcome.train, *outcome.validation)),
         channel_pictures=_channel_pictures(outcome.train, prefixes),
         overview=(overview,),
-        parameters=(parameter_table(fit),),
+        parameters=(parameter_table(fit, fit_is_rejected(outcome)),),
         parameter_pictures=parameter_pictures,
         springs=springs,
         branches=branch_tables,

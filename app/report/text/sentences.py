@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "describe_model",
     "few_data_text",
+    "fit_is_rejected",
     "identify_summary",
     "listed",
     "pull_in_text",
@@ -213,7 +214,7 @@ def undetermined_names_text(names: Iterable[str]) -> str:
 def warnings_of(outcome: IdentifyOutcome | ValidateOutcome) -> tuple[str, ...]:
     """Return all warnings without duplicates; those of a recording begin with its name."""
     fit = getattr(outcome, "fit", None)
-    said = [w[:1].upper() + w[1:] for w in fit.warnings] if fit is not None else []
+    said = [_begun(w) for w in fit.warnings] if fit is not None else []
     if fit is not None:
         comparisons = (*getattr(outcome, "train", ()), *getattr(outcome, "validation", ()))
     else:
@@ -223,6 +224,17 @@ def warnings_of(outcome: IdentifyOutcome | ValidateOutcome) -> tuple[str, ...]:
     said += getattr(outcome, "quality", ())
     said += [f"{c.name}: {w}" for c in comparisons for w in c.warnings]
     return tuple(dict.fromkeys(_sentence(w) for w in said))
+
+
+def _begun(text: str) -> str:
+    """Return ``text`` with a capital; the name of a parameter becomes its symbol instead."""
+    first, _, rest = text.partition(" ")
+    return f"{symbol(first)} {rest}" if symbol(first) != first else text[:1].upper() + text[1:]
+
+
+def fit_is_rejected(outcome: IdentifyOutcome) -> bool:
+    """Whether the residual on the training recordings rejects the fitted model."""
+    return is_rejected(smallest_p(c.misfit_p for c in outcome.train))
 
 
 def _sentence(text: str) -> str:

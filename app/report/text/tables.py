@@ -228,8 +228,11 @@ def within_text(e: Estimate) -> str:
     return interval(e.low * factor, e.high * factor) if e.free else "derived"
 
 
-def parameter_table(fit: Identification) -> Table:
-    """Return every parameter with its 95 % interval, and the thesis's Table 3 if it applies."""
+def parameter_table(fit: Identification, rejected: bool = False) -> Table:
+    """Return every parameter with its 95 % interval, and the thesis's Table 3 if it applies.
+
+    The intervals of a ``rejected`` model hold only if it is right.
+    """
     published = table_3(fit.model)
     known = fit.covariance.size > 0
     rows = []
@@ -254,7 +257,8 @@ def parameter_table(fit: Identification) -> Table:
         # without intervals all notes are the same, and the page shows it once
         details = [stated_text(e)] if e.is_fixed or not known else [e.note, stated_text(e)]
         rows.append(Row(tuple(cells), "; ".join(filter(None, details)), known and not e.determined))
-    head = [("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", "")]
+    interval_head = ("95 % interval", "if right" if rejected and known else "")
+    head = [("", ""), ("Value", ""), ("Unit", ""), interval_head]
     if fit.budget:
         head += BUDGET_HEAD
     if published:
