@@ -13,7 +13,7 @@ from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
 
-__all__ = ["BytesReader", "blocks_of", "halves_of", "line_feeds"]
+__all__ = ["BytesReader", "blocks_of", "halves_of"]
 
 #: Bytes of a block: so long that what is done once for each block does not count, and so short
 #: that the parser stays in the cache of the processor, which halves its time.
@@ -50,7 +50,7 @@ def blocks_of(
                 piece = block
                 if line == 1 and encoding == "utf-8-sig":
                     piece = piece.removeprefix(b"\xef\xbb\xbf")
-                count = line_feeds(piece) + (not piece.endswith(b"\n"))
+                count = _line_feeds(piece) + (not piece.endswith(b"\n"))
                 if line + count <= skip + 1:
                     line += count
                     continue
@@ -72,7 +72,7 @@ def blocks_of(
         raise InputError(f"{path} cannot be read: {said}") from error
 
 
-def line_feeds(block: bytes) -> int:
+def _line_feeds(block: bytes) -> int:
     """Return the number of line feeds in ``block``."""
     # some times faster than bytes.count for a character that is so frequent
     return int(np.count_nonzero(np.frombuffer(block, np.uint8) == ord("\n")))

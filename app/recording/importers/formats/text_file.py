@@ -34,7 +34,6 @@ from dearig.recording.importers.formats.text_blocks import (
     BytesReader,
     blocks_of,
     halves_of,
-    line_feeds,
 )
 from dearig.recording.importers.formats.text_layout import (
     HEAD_CHARACTERS,
@@ -54,8 +53,6 @@ __all__ = ["IMPORTER", "TextFile"]
 
 #: Bytes of a block that is read line by line where it is not whole.
 SHORT = 2**15
-#: Bytes of a file whose numbers are parsed by compiled code: pandas takes a tenth of a second.
-LONG = 2**24
 #: Threads that parse blocks.
 THREADS = 2
 #: A number with something behind it that is no comment: 1.#IND is how some programs write NaN.
@@ -226,36 +223,11 @@ class TextFile(NamedColumns[TextColumn]):
         self._leaves_out, self._counts = skip, counts
         table = Table(len(wanted))
         size = left = self._size
-        is_long = size >= LONG and self._is_plain and bool(wanted)
-        for line, block, values in self._compiled(table) if is_long else self._parsed():
+        for line, block, values in self._parsed():
             self._keep(line, block, values, table, left)
             left -= len(block)
             self.progress(1.0 - max(left, 0) / size)
         return table
-
-    def _compiled(self, table: Table) -> Iterator[tuple[int, bytes, list[np.ndarray] | None]]:
-        """Yield blocks as ``_parsed`` does, parsed by compiled code where they are plain numbers.
-
-        The code is loaded, or compiled, in seconds: only a long file is worth them.
-        """
-        from dearig.recording.importers.formats.number_block import numbers_of
-
-        layout, wanted = self.layout, self._wanted
-        undecided = {c.place for c in wanted if c.undecided and c.name not in self._decided}
-        places = [c.place for c in wanted]
-        left = self._size
-        for line, block in self._blocks():
-            room = table.room(len(wanted), line_feeds(block) + 1, left / len(block))
-            found = numbers_of(
-                block, layout.delimiter, wanted[0].decimal, places, layout.cells, room
-            )
-            left -= len(block)
-            if found is None:
-                yield line, block, self._read_fast(block)
-                continue
-            rows, pointed = found
-            self._pointed |= {p for p, has in zip(places, pointed, strict=True) if has} & undecided
-            yield line, block, list(room[:, :rows])
 
     def _decide(self, name: str) -> bool:
         """Find the signs in the numbers of a column from all its cells; return if they changed.

@@ -24,20 +24,15 @@ class Table:
         """The rows that are there, (columns, rows)."""
         return self._room[:, : self.rows]
 
-    def room(self, width: int, count: int, more: float) -> np.ndarray:
-        """Return the place (width, count) of the next rows; ``more`` times as many are expected."""
-        end = self.rows + count
-        if end > self._room.shape[1]:
-            # room that is never written takes no memory
-            grown = np.empty((width, self.rows + int(count * max(more, 1.0) * ROOM) + 1))
-            grown[:, : self.rows] = self.values
-            self._room = grown
-        return self._room[:, self.rows : end]
-
     def append(self, columns: Sequence[np.ndarray], more: float) -> None:
         """Append rows; ``more`` times as many are expected, with these."""
         count = columns[0].size if columns else 0
-        for room, values in zip(self.room(len(columns), count, more), columns, strict=True):
-            if room.ctypes.data != values.ctypes.data:  # it may be there already
-                room[:] = values
-        self.rows += count
+        end = self.rows + count
+        if end > self._room.shape[1]:
+            # room that is never written takes no memory
+            grown = np.empty((len(columns), self.rows + int(count * max(more, 1.0) * ROOM) + 1))
+            grown[:, : self.rows] = self.values
+            self._room = grown
+        for room, values in zip(self._room[:, self.rows : end], columns, strict=True):
+            room[:] = values
+        self.rows = end
