@@ -283,7 +283,8 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
             f"explains the rest."
         )
     helps = "helps" if len(names) == 1 else "help"
-    tried = f" {listed(names)} {helps}, but only a little." if names else ""
+    most = listed(names)
+    tried = f" {most[:1].upper()}{most[1:]} {helps}, but only a little." if names else ""
     return f"The residual is more than noise, and no known effect explains it.{tried}"
 
 
@@ -355,7 +356,7 @@ def _sureness(outcome: DiagnoseOutcome) -> list[str]:
     others = [
         f"{family_label(f)} ({p:.2f})"
         for f, p in known.items()
-        if families and p >= _NOT_EXCLUDED and f not in families and f != "none"
+        if families and p >= _NOT_EXCLUDED and f not in (*families, "none", "unknown")
     ]
     if others:
         said.append(f"Not excluded: {listed(others)}.")
