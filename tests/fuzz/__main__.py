@@ -94,7 +94,8 @@ def main() -> None:
         folder.mkdir(exist_ok=True)
         done, failures = run(name, asked.seed, count, deadline, folder)
         total += done
-        found = len(list(folder.glob(f"*{TARGETS[name].suffix}"))) - 1
+        kept = folder.glob(f"*{TARGETS[name].suffix}")
+        found = sum(path.stem != "current" for path in kept)
         print(
             f"{name}: {done} inputs in {time.monotonic() - began:.0f} s, "
             f"{failures} crashes or hangs, {found} findings in {folder}",

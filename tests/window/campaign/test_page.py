@@ -164,7 +164,8 @@ def test_the_present_run_is_shown_live_on_its_page_and_on_run(
     window.show_page(run)
     qtbot.waitUntil(lambda: run.plots.curve("model 0")[0].size > 100, timeout=_PATIENCE)
     words = run.display.view.words
-    assert words.text() in [f"Running: {name}" for name in NAMES]
+    running = [f"Running: {name}" for name in NAMES]
+    qtbot.waitUntil(lambda: words.text() in running, timeout=_PATIENCE)  # not between two
     qtbot.waitUntil(lambda: run.controls.numbers["rms 0"].text != "—", timeout=_PATIENCE)
     qtbot.waitUntil(lambda: words.text() == f"Running: {NAMES[2]}", timeout=_PATIENCE)
     ended(qtbot, run.runner)
