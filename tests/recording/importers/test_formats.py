@@ -415,7 +415,10 @@ def test_tdms_time_stamps_keep_each_microsecond(tmp_path: Path) -> None:
 
 def test_tdms_starts_of_waveforms_keep_each_microsecond(tmp_path: Path) -> None:
     start = np.datetime64("2024-03-01T12:00:00.000000")
-    begun = [c.properties | {"wf_start_time": start + us} for us, c in enumerate(channels())]
+    begun = [
+        c.properties | {"wf_start_time": start + np.timedelta64(us, "us")}
+        for us, c in enumerate(channels())
+    ]
     path = tdms(
         tmp_path / "in.tdms",
         *(ChannelObject("Log", n, v, p) for p, (n, v) in zip(begun, RAW.items(), strict=True)),
