@@ -257,8 +257,8 @@ def _probabilities(said: Said) -> Iterator[str]:
         yield f"the probabilities add up to {sum(shares.values()):.4g}"
     named = {s["family"] for s in j["steps"]}
     others = {f for s in j["steps"] for f in s["indistinguishable_from"]}
-    if j["verdict"] == "not_confirmed":
-        return
+    if j["verdict"] in ("not_confirmed", "unexplained"):
+        return  # no effect is named
     for s in j["steps"]:
         p = missing.get(s["family"])
         if p is not None and p < _NAMED and not s["indistinguishable_from"]:

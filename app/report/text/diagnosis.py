@@ -11,7 +11,7 @@ from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
 from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, TOLERANCE
 from dearig.report.text.excitation import tested_texts, undetermined_texts
 from dearig.report.text.laws import place_text
-from dearig.report.text.numbers import significant
+from dearig.report.text.numbers import significant, symbol
 from dearig.report.text.sentences import few_data_text, listed, undetermined_names_text
 from dearig.units import SHOWN, readable
 
@@ -162,6 +162,12 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     said += tested_texts(outcome)
     if outcome.few_data:
         said.append(few_data_text(outcome.few_data))
+    stated = [symbol(e.name) for e in finding.final.estimates if e.constraint is not None]
+    if stated and outcome.is_rejected:
+        said.append(
+            f"Every fit keeps to what was stated of {listed(stated)}: a wrong value leaves more "
+            f"than noise too."
+        )
     said += _sureness(outcome)
     said += _undetermined(outcome)
     said += _events(outcome)
@@ -283,7 +289,8 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
             f"explains the rest."
         )
     helps = "helps" if len(names) == 1 else "help"
-    tried = f" {listed(names)} {helps}, but only a little." if names else ""
+    most = listed(names)
+    tried = f" {most[:1].upper()}{most[1:]} {helps}, but only a little." if names else ""
     return f"The residual is more than noise, and no known effect explains it.{tried}"
 
 
@@ -355,7 +362,7 @@ def _sureness(outcome: DiagnoseOutcome) -> list[str]:
     others = [
         f"{family_label(f)} ({p:.2f})"
         for f, p in known.items()
-        if families and p >= _NOT_EXCLUDED and f not in families and f != "none"
+        if families and p >= _NOT_EXCLUDED and f not in (*families, "none", "unknown")
     ]
     if others:
         said.append(f"Not excluded: {listed(others)}.")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from dearig.model.fitting.parameters import Constraint
 from dearig.report.as_json import diagnosis_json
 from dearig.report.text.diagnosis import summary
 from dearig.report.text.estimates import (
@@ -54,3 +57,13 @@ def test_intervals_under_a_model_that_the_data_reject_are_marked(verdict, reject
     ):
         assert (CONDITIONAL_TEXT in table.note) is rejected
         assert (("95 % interval", "if right") in table.head) is rejected
+
+
+@pytest.mark.parametrize(("verdict", "told"), [("explained", False), ("unexplained", True)])
+def test_what_was_stated_may_be_why_a_model_is_rejected(verdict, told) -> None:
+    made = finding(verdict=verdict)
+    first, *others = made.final.estimates
+    fixed = replace(first, constraint=Constraint(first.name, fixed=first.value))
+    made = replace(made, final=replace(made.final, estimates=(fixed, *others)))
+    said = " ".join(summary(diagnose_outcome(finding=made)))
+    assert ("a wrong value leaves more than noise too" in said) is told
