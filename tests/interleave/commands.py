@@ -156,8 +156,12 @@ def play(commands: list[Command], folder: Path, notes: Path) -> list[Ended]:
     hung: set[int] = set()
     alive: dict[int, tuple[int, int]] = {}  # descriptor of a process: its number, its command
     worked: dict[int, tuple[float, float]] = {}  # its processor time in s, and since when
+    looked = 0.0
     while due or alive:
         now = time.monotonic() - began
+        if now - looked > HUNG / 2.0:  # this process was stopped itself
+            worked.clear()
+        looked = now
         for pid, n in alive.values():
             used = _processor_time(pid)
             if used != worked.get(pid, (0.0, 0.0))[0]:
