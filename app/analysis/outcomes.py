@@ -414,7 +414,7 @@ class DiagnoseOutcome:
         if not (self.finding.steps and (doubted or self.verdict == NOT_CONFIRMED)):
             return families
         left = 1.0
-        if self.recommends_final:
+        if self.recommends_final and self._comparable:
             above = [
                 max(pooled_steady_rms(some) ** 2 - (pooled_noise(some) or self.noise) ** 2, 0.0)
                 for some in ([pair[i] for pair in self._comparable] for i in (0, 1))

@@ -490,7 +490,7 @@ def _merged(titles: Sequence[str], below: Sequence[str], names: list[str]) -> li
     A merged cell has its text in the first place, and the line ``below`` a text in each.
     """
     found, title = list(names), ""
-    for place, name in enumerate(below):
+    for place, name in enumerate(below[: len(names)]):
         over = titles[place] if place < len(titles) else ""
         after = titles[place + 1] if place + 1 < len(titles) else ""
         starts = bool(over and name and not after and place + 1 < len(below) and below[place + 1])
