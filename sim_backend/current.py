@@ -94,7 +94,7 @@ def _add_flow(
     """Add to ``current`` (M,) A what flows between the steps, ``into`` s into each interval.
 
     The charging current is the parabola with its values at both ends, whose integral is the change
-    of the charge.
+    of the charge. What flows faster than the amplifier delivers was moved (``_take_fast``).
     """
     x = into / interval
     for k in range(current.shape[0]):
@@ -103,6 +103,25 @@ def _add_flow(
         current[k] += first * (1.0 - x) + last * x
         current[k] += 6.0 * x * (1.0 - x) * (mean - 0.5 * (first + last))
         current[k] += conduction[0, k] * (1.0 - x) + conduction[1, k] * x
+
+
+@jit
+def _take_fast(
+    charge: np.ndarray, charging: np.ndarray, interval: float, tau: float, step: np.ndarray
+) -> None:
+    """Move to ``step`` (M,) C what would flow faster than the amplifier delivers, in ``tau`` s.
+
+    Contacts that conduct better under a larger voltage pass a step in nanoseconds. ``charge`` and
+    ``charging`` (2, M) keep what flows at the end of each interval; all are changed in place.
+    """
+    for k in range(step.shape[0]):
+        first, last = charging[0, k], charging[1, k]
+        pulse = charge[1, k] - charge[0, k] - last * interval
+        # an exponential of this charge that begins with the first current
+        if pulse * (first - last) > 0.0 and abs(pulse) < tau * abs(first - last):
+            step[k] += pulse
+            charge[0, k] = charge[1, k] - last * interval
+            charging[0, k] = last
 
 
 @dataclass(frozen=True)
@@ -140,11 +159,13 @@ class CurrentMonitor:
         ``slew`` V/s is the limit of the output, ``capacitance`` F that of the film.
         """
         tau = self._tau + electricity.lag
-        step = electricity.step
+        step, charge = electricity.step.copy(), electricity.charge.copy()
+        charging = electricity.charging.copy()
+        _take_fast(charge, charging, self._spacing, tau, step)
         current, film = self._pulses(step, tau, slew * capacitance, into, state.film)
         _add_flow(
-            electricity.charge,
-            electricity.charging,
+            charge,
+            charging,
             electricity.conduction,
             self._spacing,
             max(into - self._blur, 0.0),

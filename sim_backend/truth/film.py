@@ -54,6 +54,7 @@ NO_COURSE = (1.0, 1.0, 1.0, 0.0, 1.0)
 _STRETCH_MAX = 20.0
 _STABLE = 1.0  # maximum of step times fastest decay rate; the formula is stable up to 3.3
 _STEPS_MAX = 1e4  # in an interval; limits the work on a diverging film
+_COUNT_MAX = 1e18  # near the largest whole number
 
 # fifth-order solution of RK5(4)7M, Dormand and Prince, J. Comp. Appl. Math. 6 (1980)
 _STAGES = np.array(
@@ -356,6 +357,19 @@ def _fastest(body: _Body, h: Hidden, rate: float) -> float:
 
 
 @jit
+def _charging_rate(body: _Body, h: Hidden, gap: float, lam: float) -> float:
+    """Return the rate in 1/s at which the charge follows across ``gap`` V of the electrode.
+
+    Contacts conduct better under a larger voltage: after a step of kilovolts in nanoseconds, which
+    a step of the integration must not pass over.
+    """
+    away, most = lam - body.rest, abs(gap)
+    slope = electrode_charging(h.further, most + 0.5, away)  # over a volt
+    slope -= electrode_charging(h.further, most - 0.5, away)
+    return slope / (body.capacitance * lam * lam)
+
+
+@jit
 def _intact(springs: np.ndarray, y: np.ndarray) -> bool:
     """Return True while the film is intact: finite, not diverging, no spring locked."""
     if not (0.0 < y[0] < _STRETCH_MAX and math.isfinite(y[1])):
@@ -393,7 +407,7 @@ def follow(
     nodes = time.shape[0]
     slopes = np.empty((6, n))
     trial = np.empty(n)
-    damped = _fastest(body, h, 1.0) > 0.0
+    damped = _fastest(body, h, 1.0) > 0.0 or h.further.contact > 0.0
     for k in range(nodes):
         rows[0, k], rows[1, k], rows[2, k] = y[0], y[1], y[_WARM_1]
         rows[3, k], rows[4, k] = y[_SECTION_1], y[_SECTION_2]
@@ -420,8 +434,13 @@ def follow(
                     slopes[0],
                 )
                 ahead = abs(y[1]) + abs(slopes[0, 1]) * left / steps
-                wanted = left * _fastest(body, h, ahead) / _STABLE
-                steps = max(steps, math.ceil(min(wanted, _STEPS_MAX)))
+                wanted = min(left * _fastest(body, h, ahead) / _STABLE, _STEPS_MAX)
+                if h.further.contact > 0.0:
+                    # few steps are so short: the current falls with the voltage that drives it
+                    gap = voltage[k] + change * elapsed / interval - y[_SECTION_1]
+                    charging = left * _charging_rate(body, h, gap, y[0]) / _STABLE
+                    wanted = max(wanted, min(charging, _COUNT_MAX))
+                steps = max(steps, math.ceil(wanted))
             h_step = left / steps
             for stage in range(6):
                 fraction = 0.0  # of the step: a stage's time is the sum of its row

@@ -14,6 +14,7 @@ from dearig.sim_backend.current import CurrentMonitor, CurrentState
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.plant import Electricity
 from dearig.sim_backend.truth.film import FilmNumbers, rest_stretch
+from dearig.sim_backend.truth.generator_b.electric import contacts
 from dearig.sim_backend.truth.plant import TruthPlant
 from tests.deep import one_of_each
 from tests.sim_backend.truth.test_cases import FORMS
@@ -170,3 +171,24 @@ def test_rows_of_many_conversions_show_what_the_film_takes_up():
     slope = np.sum(current * change) / np.sum(change**2)
     assert slope == pytest.approx(1.0, abs=0.02)
     assert np.abs(change).max() > 2e-5
+
+
+def test_contacts_that_conduct_better_under_more_voltage_let_a_step_pass():
+    """In nanoseconds, which neither the film's steps nor the monitor's may pass over.
+
+    Of V' = -(v / RC) sinh(V / v) the hyperbolic tangent of V / 2v falls exponentially.
+    """
+    time = np.arange(8) * 1e-3
+    voltage = np.where(time < 0.004, 6000.0, 0.0)
+    effect = contacts(np.random.default_rng(3), THESIS_LOAD)
+    motion, _ = TruthPlant.at_rest(NUMBERS, (effect,)).advance(time, voltage, True)
+    seen, charge = motion.electricity.voltage[1], motion.electricity.charge[1]
+    law = effect.on_film(NUMBERS).hidden.further
+    times = law.contact * charge[3] / seen[3]
+    twice, left = 2.0 * law.contact_voltage, np.exp(-(time[4:7] - 0.003) / times)
+    expected = twice * np.arctanh(np.tanh(seen[3] / twice) * left)
+    np.testing.assert_allclose(seen[4:7], expected, rtol=0.01)  # the film's capacitance changes
+    shown, _ = monitor(1e-3).read(
+        motion.electricity, SLEW, CAPACITANCE, slice(None), 1e-5, CurrentState()
+    )
+    assert np.abs(shown).max() < 2.0 * charge[3] / 1e-5
