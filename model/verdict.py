@@ -74,6 +74,7 @@ def judge(
     moves_at_rest: bool = False,
     gain: float | None = None,
     undetermined: bool = False,
+    predicts_better: bool = True,
 ) -> Judgement:
     """Return the verdict that the numbers support, which is never more than ``found``.
 
@@ -86,9 +87,12 @@ def judge(
     twice the logarithm of how much more probable the validation recordings are with the effects
     that were found, None where none was found or nothing validates it. ``undetermined`` says that
     each validation recording above its noise asks for what the training recordings do not show.
+    With ``predicts_better`` the final model leaves a smaller error on all validation recordings
+    together than the baseline; what is more probable on most of them may ruin the others.
     """
     beyond = any(error > TOLERANCE for error in validation)
-    if found in (EXPLAINED, PARTLY_EXPLAINED) and gain is not None and gain < CONFIRMING and beyond:
+    fails = gain is not None and (gain < CONFIRMING or not predicts_better)
+    if found in (EXPLAINED, PARTLY_EXPLAINED) and fails and beyond:
         return Judgement(NOT_CONFIRMED, ("prediction",))
     if found not in (NOTHING_MISSING, EXPLAINED):
         return Judgement(found)

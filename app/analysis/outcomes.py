@@ -473,6 +473,7 @@ class DiagnoseOutcome:
             any(c.moves_at_rest for c in self.after.train),
             self.gain,
             bool(self.undetermined),
+            self.recommends_final,
         )
 
     @property

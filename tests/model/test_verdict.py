@@ -80,6 +80,13 @@ def test_what_untouched_recordings_do_not_confirm_is_not_confirmed(found, gain):
     assert told == Judgement(NOT_CONFIRMED, ("prediction",))
 
 
+@pytest.mark.parametrize("found", [EXPLAINED, PARTLY_EXPLAINED])
+def test_what_helps_on_most_recordings_and_ruins_one_is_not_confirmed(found):
+    validation, much = [1.0, 126.0], 2.0 * CONFIRMING
+    told = judge(found, COMPLETE, [1.0], validation, BETTER, gain=much, predicts_better=False)
+    assert told == Judgement(NOT_CONFIRMED, ("prediction",))
+
+
 def test_a_better_prediction_that_is_not_yet_noise_is_a_part():
     assert judge(EXPLAINED, COMPLETE, [1.0], [6.2], BETTER, gain=CONFIRMING).reasons == (
         "validation",
