@@ -83,45 +83,53 @@ def _deliver(
 
 
 @jit
+def _fast(charge: np.ndarray, charging: np.ndarray, k: int, interval: float, tau: float) -> float:
+    """Return the charge in C that flows at the start of interval ``k`` within ``tau`` s, or 0.
+
+    Contacts that conduct better under a larger voltage pass a step in nanoseconds. ``charge`` and
+    ``charging`` (2, M) are those at both ends of the intervals.
+    """
+    first, last = charging[0, k], charging[1, k]
+    pulse: float = charge[1, k] - charge[0, k] - last * interval
+    # an exponential of this charge that begins with the first current
+    if pulse * (first - last) > 0.0 and abs(pulse) < tau * abs(first - last):
+        return pulse
+    return 0.0
+
+
+@jit
+def _add_fast(
+    charge: np.ndarray, charging: np.ndarray, interval: float, tau: float, step: np.ndarray
+) -> None:
+    """Add to ``step`` (M,) C what flows faster than the amplifier delivers, in ``tau`` s."""
+    for k in range(step.shape[0]):
+        step[k] += _fast(charge, charging, k, interval, tau)
+
+
+@jit
 def _add_flow(
     charge: np.ndarray,
     charging: np.ndarray,
     conduction: np.ndarray,
     interval: float,
     into: float,
+    tau: float,
     current: np.ndarray,
 ) -> None:
     """Add to ``current`` (M,) A what flows between the steps, ``into`` s into each interval.
 
     The charging current is the parabola with its values at both ends, whose integral is the change
-    of the charge. What flows faster than the amplifier delivers was moved (``_take_fast``).
+    of the charge, without what flows at once (``_fast``) if the amplifier delivers in ``tau`` s.
     """
     x = into / interval
     for k in range(current.shape[0]):
         first, last = charging[0, k], charging[1, k]
         mean = (charge[1, k] - charge[0, k]) / interval
+        if _fast(charge, charging, k, interval, tau) != 0.0:
+            first = mean = last
         current[k] += first * (1.0 - x) + last * x
         current[k] += 6.0 * x * (1.0 - x) * (mean - 0.5 * (first + last))
         current[k] += conduction[0, k] * (1.0 - x) + conduction[1, k] * x
-
-
-@jit
-def _take_fast(
-    charge: np.ndarray, charging: np.ndarray, interval: float, tau: float, step: np.ndarray
-) -> None:
-    """Move to ``step`` (M,) C what would flow faster than the amplifier delivers, in ``tau`` s.
-
-    Contacts that conduct better under a larger voltage pass a step in nanoseconds. ``charge`` and
-    ``charging`` (2, M) keep what flows at the end of each interval; all are changed in place.
-    """
-    for k in range(step.shape[0]):
-        first, last = charging[0, k], charging[1, k]
-        pulse = charge[1, k] - charge[0, k] - last * interval
-        # an exponential of this charge that begins with the first current
-        if pulse * (first - last) > 0.0 and abs(pulse) < tau * abs(first - last):
-            step[k] += pulse
-            charge[0, k] = charge[1, k] - last * interval
-            charging[0, k] = last
 
 
 @dataclass(frozen=True)
@@ -159,16 +167,16 @@ class CurrentMonitor:
         ``slew`` V/s is the limit of the output, ``capacitance`` F that of the film.
         """
         tau = self._tau + electricity.lag
-        step, charge = electricity.step.copy(), electricity.charge.copy()
-        charging = electricity.charging.copy()
-        _take_fast(charge, charging, self._spacing, tau, step)
+        step = electricity.step.copy()
+        _add_fast(electricity.charge, electricity.charging, self._spacing, tau, step)
         current, film = self._pulses(step, tau, slew * capacitance, into, state.film)
         _add_flow(
-            charge,
-            charging,
+            electricity.charge,
+            electricity.charging,
             electricity.conduction,
             self._spacing,
             max(into - self._blur, 0.0),
+            tau,
             current,
         )
 

@@ -1,4 +1,4 @@
-"""Progress of a compilation: how many kernels are ready, of all that the calls in progress need.
+"""Progress of a compilation: the number of kernels compiled so far, and the number needed.
 
 Numba compiles a kernel with all kernels that it calls, and sends an event for each. The kernels
 that will be needed are found from the names in the code of each function, so that their number

@@ -10,7 +10,7 @@ resolve; what is as good there counts for the intervals.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -359,13 +359,19 @@ def _sum(found: Valleys, branch: int, span: Span) -> Estimate:
     values = layout.values(best.x)
     here = [branch, *found.beside(branch, _sites(found, best.x))]
     ever = {branch, *(b for sites in found.points for b in found.beside(branch, sites))}
+    total = float(sum(values[_columns(layout, b)["mu", 0]] for b in here))
+    return _together(ever, total, span, f"about {values[_time(layout, branch)]:.3g}")
+
+
+def _together(branches: Collection[int], total: float, span: Span, when: str) -> Estimate:
+    """Return the estimate of ``total`` Pa, the modulus of ``branches`` that relax at ``when``."""
     return Estimate(
-        " + ".join(f"mu_{b}" for b in sorted(ever)),
+        " + ".join(f"mu_{b}" for b in sorted(branches)),
         "Pa",
-        float(sum(values[_columns(layout, b)["mu", 0]] for b in here)),
+        total,
         *span,
         is_determined(*span),
-        f"all branches that relax at about {values[_time(layout, branch)]:.3g} s together",
+        f"all branches that relax at {when} s together",
     )
 
 
@@ -406,16 +412,7 @@ def sums_of_weak(
             break
         if is_determined(*span):
             low, high = (times[b] for b in (group[0], group[-1]))
-            found.append(
-                Estimate(
-                    " + ".join(f"mu_{b}" for b in sorted(group)),
-                    "Pa",
-                    sum(moduli.values()),
-                    *span,
-                    True,
-                    f"all branches that relax at {low:.3g} to {high:.3g} s together",
-                )
-            )
+            found.append(_together(group, sum(moduli.values()), span, f"{low:.3g} to {high:.3g}"))
     return tuple(found)
 
 

@@ -257,7 +257,7 @@ def bars_figure(pairs: Sequence[tuple[Comparison, Comparison]], kind: str) -> Fi
         for name, side, shift, height, colour in sides:
             ax.barh(rows + shift, errors[:, side], height=height, color=colour, label=name)
             for row, value, floor in zip(rows, errors[:, side], floors, strict=True):
-                # beside the mark of the noise, not across it
+                # to the right of the line of the noise floor, which would cross the number
                 near = 0.0 <= floor - value < 0.12 * max(errors.max(), floor)
                 ax.annotate(
                     significant(float(value)), (floor if near else value, row + shift), (4, 0),

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QScrollArea,
     QScrollBar,
+    QSpinBox,
     QTabBar,
     QTabWidget,
     QWidget,
@@ -134,3 +135,18 @@ def test_a_field_with_the_focus_answers_the_wheel(qtbot: QtBot, window: MainWind
     before = field.value()
     turn(field, -DOWN)
     assert field.value() == before + 1
+
+
+def test_a_field_around_a_field_is_kept_out_too(qtbot: QtBot, window: MainWindow) -> None:
+    outer = QTabBar(window)
+    for name in ("one", "two"):
+        outer.addTab(name)
+    inner = QSpinBox()
+    outer.setTabButton(0, QTabBar.ButtonPosition.RightSide, inner)
+    outer.setGeometry(200, 300, 400, 60)
+    outer.show()
+    outer.raise_()
+    qtbot.waitUntil(inner.isVisible)
+    for notch in (DOWN, -DOWN):
+        turn(inner, notch)
+    assert (inner.value(), outer.currentIndex()) == (0, 0)

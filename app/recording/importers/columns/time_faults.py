@@ -74,8 +74,8 @@ def jumps(time: np.ndarray, place: Callable[[int], str]) -> list[str]:
 def forward_rows(time: np.ndarray) -> np.ndarray:
     """Return rows (n,) bool of ``time`` between which it goes forward; NaN is left out.
 
-    Either the first rows count, or the last ones, whichever leave out fewer: a stamp that lies
-    ahead is wrong itself, and not all that follow it.
+    A time that is too late makes all rows after it go back. So the rows are counted from the start
+    and from the end, and the count that leaves out fewer rows is used.
     """
     there: np.ndarray = np.isfinite(time)
     first, last = there.copy(), there.copy()

@@ -97,5 +97,5 @@ def is_harmful(word: str) -> bool:
 
 
 def is_harmless(word: str) -> bool:
-    """Return True if ``word`` leaves the quantity beside it as it is."""
+    """Return True if ``word`` in a name does not change which quantity the name means."""
     return len(word) <= _SHORT or word in _HARMLESS or unit_of(word) is not None
