@@ -207,7 +207,6 @@ class MainWindow(QMainWindow):
             return
         self.session.recovery.close(keep=self._by_signal)
         self._save_state()
-        self.stop_keys.watch(False)
         self.run_page.close_work()  # first: the rig is made safe
         self.idle_pages.close()
         self.compilation.close()
@@ -345,7 +344,7 @@ class MainWindow(QMainWindow):
     def _connect(self) -> None:
         session, run = self.session, self.run_page
         self.bar.stop_pressed.connect(lambda: run.runner.stop(f"STOP on {self._title()}"))
-        run.runner.state_changed.connect(self._watch_keys)
+        run.runner.state_changed.connect(self._apply_colour_scheme)  # one that was chosen meanwhile
         run.runner.ended.connect(self._run_ended, Qt.ConnectionType.QueuedConnection)
         session.recovery.changed.connect(self._unsaved_changed)
         self._unsaved_changed()
@@ -356,7 +355,7 @@ class MainWindow(QMainWindow):
         self.compilation.failed.connect(lambda words: run.alarms.add("warning", words))
         self.planner.progressed.connect(self.sequence_page.preview.show_progress)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
-        session.running_changed.connect(self._watch_keys)
+        session.running_changed.connect(self._apply_colour_scheme)
         self.addActions(run.display.mark_bar.actions())  # the key M on every page
         session.blocks_changed.connect(lambda: self.banners.show_blocks(session.blocks))
         self.banners.show_blocks(session.blocks)
@@ -368,11 +367,6 @@ class MainWindow(QMainWindow):
     def _title(self) -> str:
         """Return the title of the page that is shown."""
         return PAGES[self.list.currentRow()].title
-
-    @Slot()
-    def _watch_keys(self) -> None:
-        self.stop_keys.watch(self.session.busy)
-        self._apply_colour_scheme()  # one that was chosen meanwhile
 
     @Slot()
     def _rig_or_folder_changed(self) -> None:
