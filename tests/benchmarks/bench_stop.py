@@ -55,6 +55,8 @@ repeats = 1000
 class Presses(Listener):
     """Hears presses of STOP, and how long the window's thread has worked between them."""
 
+    PAUSE = 0.004  # shorter than any work that counts: one press for each turn of the loop
+
     def __init__(self) -> None:
         self.worked: list[float] = []
         self._before = time.thread_time()
@@ -144,7 +146,9 @@ def heard(act: Callable[[], object]) -> list[tuple[float, float]]:
     return [(1e3 * d, 1e3 * w) for d, w in zip(listener.delays, listener.worked, strict=False)]
 
 
-def measure(ready: bool, folder: Path, only: str, collector: Collector) -> dict[str, list[tuple[float, float]]]:
+def measure(
+    ready: bool, folder: Path, only: str, collector: Collector
+) -> dict[str, list[tuple[float, float]]]:
     """Return delays and work in ms by what was done; ``ready``: as the window is."""
     delays: dict[str, list[tuple[float, float]]] = {}
     settings = QSettings(str(folder / "x.ini"), QSettings.Format.IniFormat)
