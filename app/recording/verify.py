@@ -17,7 +17,7 @@ from dearig.input_file import why_no_file
 from dearig.recording.content.checksums import wrong_blocks
 from dearig.recording.content.flushes import flush_notes
 from dearig.recording.content.journal import whole_journal
-from dearig.recording.content.layout import EVENT_LEVELS, SIGNALS, counts_name
+from dearig.recording.content.layout import EVENT_LEVELS, SIGNALS, TIMING, counts_name
 from dearig.recording.content.physical import KELVIN, SLICE, Counts
 from dearig.recording.content.provenance import CONTINUES
 from dearig.recording.content.pyramid import BINS
@@ -38,7 +38,6 @@ ROUNDING = 1e-12
 #: Largest relative difference of sample clock and computer's clock, in runs of this many s or more.
 CLOCKS_APART, CLOCKS_OVER = 0.01, 10.0
 #: Attributes of the time at which a channel is sampled, and of the rest of the displacement.
-_TIMING = ("skew_s", "delay_s", "delay_error_s")
 _REST = ("rest_reading", "rest_samples")
 #: Faults of one kind that are listed one by one, at most.
 LISTED = 5
@@ -206,7 +205,7 @@ class _Check:
         """Check that the times of each channel are possible, and are those of its counts."""
         for channel in self.recording.channels:
             raw = self.data[counts_name(channel.name)]
-            for key in _TIMING:
+            for key in TIMING:
                 value = float(raw.attrs.get(key, 0.0))
                 if not 0.0 <= value < np.inf:
                     self.fault(f"{raw.name}: {key} = {value:g} is impossible")
@@ -215,7 +214,7 @@ class _Check:
                     self.fault(f"/entry/data/{channel.name} is missing")
                 continue
             values = self.data[channel.name]
-            for key in (*_TIMING, *_REST):
+            for key in (*TIMING, *_REST):
                 if key in values.attrs and values.attrs[key] != raw.attrs.get(key):
                     self.fault(
                         f"{values.name}: {key} = {values.attrs[key]:g}, and its counts have "

@@ -243,7 +243,13 @@ def test_exports_hold_them(folder, tmp_path, to):
         assert table.schema.field("load_cell_N").metadata[b"units"] == b"N"
         column = table["load_cell_N"].to_numpy()
     np.testing.assert_array_equal(column, recording.values["load_cell"])
-    import_file(out, tmp_path / "again.h5", now=Clock())  # what it does not know it leaves out
+    import_file(out, tmp_path / "again.h5", now=Clock())
+    again = open_recording(tmp_path / "again.h5")
+    assert again.declared == recording.declared
+    assert again.unit("camera") == "V"
+    assert again.displacement_delay == recording.displacement_delay
+    np.testing.assert_array_equal(again.values["load_cell"], recording.values["load_cell"])
+    assert verify(tmp_path / "again.h5").faults == []
 
 
 def test_check_reads_them_at_zero_volts(folder):

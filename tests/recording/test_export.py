@@ -47,15 +47,26 @@ def test_a_run_comes_back_to_the_last_bit(tmp_path: Path, run: Path, to: str) ->
     assert import_file(out, tmp_path / "again.h5", now=Clock()).doubts == ()
     first, second = open_recording(run), open_recording(tmp_path / "again.h5")
     same(first, second)
-    if to != "csv":
-        # a plain table has no place for more
-        for what in ("hold", "film", "load", "kinematics", "sequence_toml"):
-            assert getattr(second, what) == getattr(first, what)
-        for what in ("simulated", "rig", "seed", "operator"):
-            assert second.provenance.get(what) == first.provenance.get(what)
+    for what in ("hold", "film", "load", "kinematics", "sequence_toml"):
+        assert getattr(second, what) == getattr(first, what)
+    for what in ("simulated", "rig", "seed", "operator"):
+        assert second.provenance.get(what) == first.provenance.get(what)
 
 
-@pytest.mark.parametrize("to", ["mat", "parquet"])
+def test_a_table_that_was_changed_is_not_described_by_the_file_beside_it(
+    tmp_path: Path, run: Path
+) -> None:
+    out = export_recording(run, "csv", tmp_path / "run.csv")
+    first, rest = out.read_text("utf-8").split("\n", 1)
+    out.write_text(f"{first}\n{rest.split(chr(10), 1)[1]}", "utf-8")
+    doubts = import_file(out, tmp_path / "again.h5", now=Clock()).doubts
+    assert any("run.csv-metadata.json does not describe this table" in text for text in doubts)
+    assert open_recording(tmp_path / "again.h5").film is None
+    (tmp_path / "run.csv-metadata.json").write_text("[" * 100_000, "utf-8")
+    import_file(out, tmp_path / "other.h5", now=Clock())
+
+
+@pytest.mark.parametrize("to", EXPORTS)
 def test_what_is_given_counts_more_than_what_was_exported(
     tmp_path: Path, run: Path, to: str
 ) -> None:

@@ -44,7 +44,7 @@ import h5py
 import numpy as np
 
 from dearig.drivers.channels import BAND_ENDINGS
-from dearig.recording.content.text import fixed, put_text
+from dearig.recording.content.text import fixed, put_text, text_of
 
 __all__ = [
     "AVERAGE_COLUMN",
@@ -60,6 +60,7 @@ __all__ = [
     "MESSAGE_BYTES",
     "REQUIRED",
     "SIGNALS",
+    "TIMING",
     "UNITS",
     "WALL_CLOCK_TYPE",
     "ZERO_ORDER",
@@ -67,7 +68,7 @@ __all__ = [
     "counts_name",
     "counts_type",
     "create_field",
-    "declared_names",
+    "declared_channels",
     "describe_field",
     "iso_time",
     "lay_out",
@@ -144,6 +145,9 @@ LONG_NAMES = MappingProxyType(
 #: Name of the recording's identifier in /entry, as NeXus has it.
 IDENTIFIER = "entry_identifier_uuid"
 
+#: Attributes of a row: skew, delay and the error of the delay, in s.
+TIMING = ("skew_s", "delay_s", "delay_error_s")
+
 #: Column of an exported table without metadata: conversions whose mean each row is, if several.
 AVERAGE_COLUMN = "conversions_per_row"
 
@@ -193,19 +197,25 @@ def iso_time(moment: float) -> str:
     return datetime.fromtimestamp(moment, tz=UTC).isoformat(timespec="milliseconds")
 
 
-def declared_names(data: h5py.Group) -> tuple[str, ...]:
-    """Return the names of the channels in /entry/data that the rig file declared, in their order.
+def declared_channels(data: h5py.Group) -> dict[str, tuple[str, str]]:
+    """Return unit and label of the channels in /entry/data that the rig file declared, by name.
 
-    They have counts like the others, and an attribute ``declared`` with their place in the order.
+    Their counts, or their values where there are none, have an attribute ``declared`` with their
+    place in the order.
     """
     suffix = counts_name("")
-    found = []
-    for name in data:
-        if name.endswith(suffix) and name.removesuffix(suffix) not in UNITS:
-            attrs = data[name].attrs
-            if "declared" in attrs:
-                found.append((int(attrs["declared"]), name.removesuffix(suffix)))
-    return tuple(name for _, name in sorted(found))
+    found = {}
+    for row in data:
+        name = row.removesuffix(suffix)
+        if name in UNITS or not isinstance(data.get(row, getlink=True), h5py.HardLink):
+            continue
+        attrs = data[row].attrs
+        if "declared" in attrs:
+            unit = attrs["physical_units" if row.endswith(suffix) else "units"]
+            place = int(attrs["declared"])
+            found[name] = place, text_of(unit), text_of(attrs.get("label", ""))
+    ordered = sorted(found.items(), key=lambda one: (one[1][0], one[0]))
+    return {name: (unit, label) for name, (_, unit, label) in ordered}
 
 
 def variable_attributes(name: str, unit: str = "", label: str = "") -> dict[str, str]:

@@ -11,7 +11,7 @@ import numpy as np
 from dearig.drivers.channels import CHANNEL_NAMES, Channel, Scaling
 from dearig.errors import InputError
 from dearig.recording.content.flushes import flush_notes
-from dearig.recording.content.layout import UNITS, counts_name, declared_names
+from dearig.recording.content.layout import UNITS, counts_name, declared_channels
 from dearig.recording.content.pyramid import levels, reduced
 from dearig.recording.content.rest_noise import NEGLIGIBLE
 from dearig.recording.content.safe import PACKED_MAX
@@ -73,7 +73,7 @@ def write_channel(counts: h5py.Dataset, channel: Channel, place: int) -> None:
 def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
     """Return the channels whose counts are in /entry/data, in the order of the blocks."""
     found = []
-    for name in (*CHANNEL_NAMES, *declared_names(data)):
+    for name in (*CHANNEL_NAMES, *declared_channels(data)):
         if counts_name(name) not in data:
             continue
         attrs = data[counts_name(name)].attrs

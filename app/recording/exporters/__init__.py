@@ -12,8 +12,9 @@ from typing import Any
 
 from dearig.drivers.registry import Registry
 from dearig.errors import InputError
-from dearig.recording.exporters.table import Exporter
-from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.content.beside import path_beside, write_beside
+from dearig.recording.exporters.table import Exporter, description_of, units_of
+from dearig.recording.files import check_output, file_sha256, replaced_when_done
 from dearig.recording.reading.reader import open_recording
 
 __all__ = ["EXPORTS", "Exporter", "export_recording"]
@@ -46,13 +47,22 @@ def export_recording(
 
     ``to`` is a name in ``EXPORTS`` (csv, mat, parquet). ``out`` is by default the recording's own
     name with another suffix. Columns are named with their units and hold every number to the last
-    bit. Raises ``InputError``.
+    bit. What the format has no place for is in a second file, ``out`` with ``-metadata.json``
+    behind its name, which an import reads. Raises ``InputError``.
     """
     path = Path(path)
     if to not in EXPORTS:
         raise InputError(f"a recording is exported to {', '.join(EXPORTS)}, not to {to!r}")
+    exporter = EXPORTS[to]
     out = check_output(path.with_suffix(f".{to}") if out is None else out, overwrite, path)
+    beside = None if exporter.describes else check_output(path_beside(out), overwrite, path)
     recording = open_recording(path)
     with replaced_when_done(out, overwrite) as partial:
-        EXPORTS[to].write(recording, partial)
+        exporter.write(recording, partial)
+        if beside is not None:
+            digest = file_sha256(partial)
+            with replaced_when_done(beside, overwrite) as description:
+                write_beside(
+                    description, out.name, digest, units_of(recording), description_of(recording)
+                )
     return out

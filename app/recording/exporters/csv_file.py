@@ -18,7 +18,7 @@ BATCH = 20_000
 
 def _write(recording: Recording, path: Path) -> None:
     columns = columns_of(recording)
-    if recording.average > 1:  # a CSV file has no other place for it
+    if recording.average > 1:  # also for those who have the table alone
         columns[AVERAGE_COLUMN] = np.full(recording.samples, recording.average)
     with path.open("w", encoding="utf-8", newline="") as stream:
         stream.write(",".join(columns) + "\n")
@@ -28,4 +28,4 @@ def _write(recording: Recording, path: Path) -> None:
             stream.writelines(",".join(map(repr, row)) + "\n" for row in rows)
 
 
-EXPORTER = Exporter("CSV", _write)
+EXPORTER = Exporter("CSV", _write, describes=False)

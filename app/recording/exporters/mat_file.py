@@ -31,6 +31,7 @@ def _write(recording: Recording, path: Path) -> None:
             stream,
             columns | {"units": units_of(recording), "about": about},
             oned_as="column",
+            long_field_names=True,
             do_compression=True,
         )
 

@@ -31,6 +31,9 @@ COLUMNS = MappingProxyType(
     }
 )
 
+#: Values that an import finds by the quantities in the names of its columns.
+IMPORTED = tuple(name for name in COLUMNS if name != "displacement_model")
+
 
 @dataclass(frozen=True)
 class Exporter:
@@ -42,29 +45,50 @@ class Exporter:
         Name of the format for menus and messages.
     write : callable
         Writes a recording to a path, which does not exist yet. May raise ``InputError``.
+    describes : bool
+        True if the file has the description of the recording too. Otherwise it is written to a
+        file beside it.
     """
 
     title: str
     write: Callable[[Recording, Path], None]
+    describes: bool = True
 
 
 def columns_of(recording: Recording) -> dict[str, np.ndarray]:
     """Return the values (N,) by the names of the exported columns, ``time_s`` first."""
-    return {_column(recording, name): values for name, values in recording.values.items()}
+    return {_columns(recording)[name]: values for name, values in recording.values.items()}
 
 
 def units_of(recording: Recording) -> dict[str, str]:
     """Return the unit of each exported column by its name."""
-    return {_column(recording, name): recording.unit(name) for name in recording.values}
+    return {column: recording.unit(name) for name, column in _columns(recording).items()}
 
 
-def _column(recording: Recording, name: str) -> str:
-    """Return the name of the exported column; for a declared channel, name and unit."""
-    return COLUMNS.get(name) or f"{name}_{re.sub(r'[^A-Za-z0-9]+', '_', recording.unit(name))}"
+def _columns(recording: Recording) -> dict[str, str]:
+    """Return the name of the exported column of each value; for a declared channel, with its unit.
+
+    A channel may be called as a built-in column is, such as current in A: it is numbered.
+    """
+    found: dict[str, str] = {}
+    for name in recording.arrays.names:
+        unit = re.sub(r"[^A-Za-z0-9]+", "_", recording.unit(name))
+        plain = column = COLUMNS.get(name) or f"{name}_{unit}"
+        number = 1
+        while column in found.values():
+            number += 1
+            column = f"{plain}_{number}"
+        found[name] = column
+    return found
 
 
 def description_of(recording: Recording) -> dict[str, str]:
-    """Return the metadata that an import reads back, as texts by name."""
+    """Return the metadata that an import reads back, as texts by name.
+
+    ``channels`` has the columns that no quantity of an import is in: name, unit and label of a
+    declared channel, and the name alone of what a model computed.
+    """
+    columns = _columns(recording)
     return {
         "format": FORMAT,
         "name": recording.name,
@@ -78,5 +102,19 @@ def description_of(recording: Recording) -> dict[str, str]:
         "sequence": recording.sequence_toml,
         "provenance": json.dumps(recording.provenance),
         "rest_reading": repr(float(recording.rest_reading)),
+        "displacement_timing": json.dumps(
+            [
+                recording.displacement_skew,
+                recording.displacement_delay,
+                recording.displacement_delay_error,
+            ]
+        ),
+        "channels": json.dumps(
+            {
+                columns[name]: [name, *recording.declared_channels.get(name, ())]
+                for name in columns
+                if name not in IMPORTED
+            }
+        ),
         "events": json.dumps([[e.sample, e.level, e.message] for e in recording.events]),
     }

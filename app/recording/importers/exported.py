@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import TypeVar
 
+from dearig.drivers.channels import RESERVED_NAMES
 from dearig.drivers.rig import Event
 from dearig.model.errors import ModelError
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.recording.content.fields import TEXTS
-from dearig.recording.content.layout import EVENT_LEVELS, FORMAT, ZERO_ORDER
+from dearig.recording.content.layout import (
+    EVENT_LEVELS,
+    FORMAT,
+    UNITS,
+    ZERO_ORDER,
+    counts_name,
+)
 from dearig.recording.content.provenance import is_start_known
 
 __all__ = ["Exported", "exported"]
@@ -33,9 +41,12 @@ T = TypeVar("T", Film, Load)
 class Exported:
     """Fields as in a ``Recording``; missing or invalid ones have their defaults.
 
-    ``origin`` has those values of the provenance that say where the data are from. ``rest_reading``
-    is that of a displacement that is counted from it already, None if the file tells none.
-    ``started`` is the Unix time in s of the start of the run, None if the file does not tell it.
+    ``channels`` are the columns of declared channels: name, unit and label; ``computed`` are the
+    columns that a model computed, which are not imported. ``timing`` are skew, delay and the error
+    of the delay of the displacement in s. ``origin`` has those values of the provenance that say
+    where the data are from. ``rest_reading`` is that of a displacement that is counted from it
+    already, None if the file tells none. ``started`` is the Unix time in s of the start of the run,
+    None if the file does not tell it.
     """
 
     hold: bool = False
@@ -47,6 +58,9 @@ class Exported:
     origin: Mapping[str, object] = field(default_factory=dict)
     rest_reading: float | None = None
     events: tuple[Event, ...] = ()
+    channels: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
+    computed: tuple[str, ...] = ()
+    timing: tuple[float, float, float] = (0.0, 0.0, 0.0)
     started: float | None = None
 
 
@@ -56,6 +70,7 @@ def exported(about: Mapping[str, str]) -> Exported:
         return Exported()
     kinematics = about.get("kinematics")
     noted = _noted(about.get("provenance", ""))
+    columns = list(_columns(about.get("channels", "")))
     return Exported(
         hold=about.get("hold") == ZERO_ORDER,
         average=_whole(about.get("average", "")),
@@ -66,6 +81,9 @@ def exported(about: Mapping[str, str]) -> Exported:
         origin=_origin(noted),
         rest_reading=_number(about.get("rest_reading", "")),
         events=tuple(_events(about.get("events", ""))),
+        channels={column: (n, u, t) for column, (n, u, t) in columns if _is_channel(n, u)},
+        computed=tuple(column for column, (n, u, _) in columns if not u and n in UNITS),
+        timing=_timing(about.get("displacement_timing", "")),
         started=_started(noted),
     )
 
@@ -95,8 +113,42 @@ def _events(text: str) -> Iterator[Event]:
                 yield Event(sample, level, message)
 
 
+def _columns(text: str) -> Iterator[tuple[str, tuple[str, str, str]]]:
+    """Yield each column in ``text`` with name, unit and label; both are empty for a model's."""
+    for column, told in _noted(text).items():
+        match told:
+            case [str(name)]:
+                yield column, (name, "", "")
+            case [str(name), str(unit), str(label)]:
+                yield column, (name, unit, label)
+
+
+#: Names and units that a rig file can give to a channel.
+_NAME, _UNIT_MAX = re.compile(r"[a-z][a-z0-9_]{0,39}"), 16
+
+
+def _is_channel(name: str, unit: str) -> bool:
+    return (
+        bool(_NAME.fullmatch(name))
+        and 0 < len(unit) <= _UNIT_MAX
+        and name not in RESERVED_NAMES
+        and not name.endswith(counts_name(""))
+    )
+
+
+def _timing(text: str) -> tuple[float, float, float]:
+    """Return three times in s that are finite and not negative; 0 s for another text."""
+    try:
+        skew, delay, error = (float(seconds) for seconds in json.loads(text))
+    except (TypeError, ValueError, RecursionError):
+        return 0.0, 0.0, 0.0
+    if not all(0.0 <= seconds < math.inf for seconds in (skew, delay, error)):
+        return 0.0, 0.0, 0.0
+    return skew, delay, error
+
+
 def _noted(text: str) -> dict[str, object]:
-    """Return the provenance in ``text``; empty where it is none."""
+    """Return the object of JSON in ``text``, such as the provenance; empty where it is none."""
     try:
         found = json.loads(text) if text else {}
     except (ValueError, RecursionError):

@@ -14,6 +14,7 @@ from dearig.errors import InputError, Note, hints_of
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.progress import Progress, part, quiet
 from dearig.recording.content.assumed import ASSUMED, FILM_VALUES, assumed_of
+from dearig.recording.content.beside import description_beside, path_beside
 from dearig.recording.content.layout import AVERAGE_COLUMN
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.provenance import FROM_IMPORT, START_FROM
@@ -25,13 +26,14 @@ from dearig.recording.importers.columns.chosen import (
     UNIT_HOLE,
     Chosen,
     import_command,
+    take_channels,
 )
 from dearig.recording.importers.columns.plausible import doubts
 from dearig.recording.importers.columns.proposal import first_values
 from dearig.recording.importers.columns.specimen import Specimen
 from dearig.recording.importers.columns.start import Start
 from dearig.recording.importers.columns.values import Values, values_of
-from dearig.recording.importers.exported import exported
+from dearig.recording.importers.exported import Exported, exported
 from dearig.recording.importers.quantities.units import UnitScale
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import NeedsOptionError, Source
@@ -126,6 +128,7 @@ class Prepared:
     rest_reading: float
     events: tuple[Event, ...]
     start: Start | None = None
+    timing: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def imported(self) -> Imported:
@@ -178,6 +181,8 @@ def import_file(
         kinematics=found.kinematics,
         rest_reading=found.rest_reading,
         events=found.events,
+        channels=found.values.channels,
+        timing=found.timing,
         started=None if found.start is None else found.start.at,
         overwrite=overwrite,
         now=now,
@@ -205,12 +210,14 @@ def prepare(
         reading = part(progress, OPENED, READ)
         table.progress = lambda done: reading("reading", done)
     progress("reading", OPENED)
+    was, doubt = _exported(table)
     chosen = choose(
-        table, options.columns, options.raw,
-        timed=options.rate_Hz is not None, table=options.table, guess=options.guess,
+        table, options.columns, options.raw, timed=options.rate_Hz is not None,
+        table=options.table, guess=options.guess, apart={*was.channels, *was.computed},
     )  # fmt: skip
     if chosen.unsure:
         raise UnsureError(chosen)
+    take_channels(chosen, was.channels)
     specimen = Specimen(options.gauge_length_mm, options.area_mm2)
     stop = Flag()
     # hashing a file takes as long as reading its numbers
@@ -222,7 +229,6 @@ def prepare(
             stop.set()  # of a wrong cell, or an interrupt, one hears at once
             raise
     progress("checking", READ)
-    was = exported(table.about)
     average = max(was.average, _average_of(table))
     noted = _provenance(path, digest.result(), chosen, options)
     start = values.start
@@ -236,7 +242,7 @@ def prepare(
         # a displacement that was exported is counted from its rest already
         rest = _from_rest(values) if was.rest_reading is None else was.rest_reading
         film = _of_actuator(values, film, metadata.load or was.load, kinematics, noted)
-    values.warnings += doubts(values.columns, film)
+    values.warnings += [*doubts(values.columns, film), *doubt]
     return Prepared(
         chosen,
         values,
@@ -254,7 +260,20 @@ def prepare(
         rest_reading=rest,
         events=tuple(_events(values, was.events)),
         start=start,
+        timing=was.timing,
     )
+
+
+def _exported(table: Source) -> tuple[Exported, list[str]]:
+    """Return the metadata of the recording that ``table`` was exported from, with doubts."""
+    if table.about or not path_beside(table.path).is_file():
+        return exported(table.about), []
+    about = description_beside(table.path, file_sha256(table.path))
+    if about is not None:
+        return exported(about), []
+    return Exported(), [
+        f"{path_beside(table.path).name} does not describe this table as it is, and was not used"
+    ]
 
 
 def _average_of(table: Source) -> int:

@@ -17,10 +17,11 @@ from dearig.recording.content.layout import (
     FORMAT_NAME,
     KINDS,
     REQUIRED,
+    TIMING,
     UNITS,
     ZERO_ORDER,
     counts_name,
-    declared_names,
+    declared_channels,
 )
 from dearig.recording.content.physical import (
     Counts,
@@ -169,6 +170,7 @@ class _Reader:
             events=read_events(self.path, entry),
             instruments=self._instruments(entry),
             channels=channels,
+            declared_channels=declared_channels(data),
             provenance=self._provenance(entry),
             environment=None if rate is None else read_environment(entry, rate),
         )
@@ -242,10 +244,7 @@ class _Reader:
     def _stored(self, data: h5py.Group) -> tuple[str, ...]:
         """Return the names of the physical values that are stored."""
         found = []
-        declared = {
-            name: text_of(data[counts_name(name)].attrs["physical_units"])
-            for name in declared_names(data)
-        }
+        declared = {name: unit for name, (unit, _) in declared_channels(data).items()}
         for name, unit in {**UNITS, **declared}.items():
             row = item(data, name)
             if row is None:
@@ -287,9 +286,7 @@ class _Reader:
         for name in ("displacement", counts_name("displacement")):
             if name in data:
                 attrs = data[name].attrs
-                skew, delay, error = (
-                    float(attrs.get(key, 0.0)) for key in ("skew_s", "delay_s", "delay_error_s")
-                )
+                skew, delay, error = (float(attrs.get(key, 0.0)) for key in TIMING)
                 return skew, delay, error
         return 0.0, 0.0, 0.0
 

@@ -65,7 +65,8 @@ class Recording:
     mean of ``average`` conversions, spread evenly over its interval, and its time is the mean of
     their ticks: the converter held the voltage for one conversion after each. ``environment`` are
     the readings of a thermo-hygrometer, None for a run without one. ``texts`` has film, notes and
-    others by the keys of ``content.fields.TEXTS``.
+    others by the keys of ``content.fields.TEXTS``. ``channels`` are those of the counts, empty for
+    data without counts; ``declared_channels`` has unit and label of those that a rig file declared.
     """
 
     path: Path
@@ -93,6 +94,7 @@ class Recording:
     events: tuple[RecordedEvent, ...] = ()
     instruments: tuple[Instrument, ...] = ()
     channels: tuple[Channel, ...] = ()
+    declared_channels: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     provenance: dict[str, object] = field(default_factory=dict)
     environment: Environment | None = None
 
@@ -183,8 +185,8 @@ class Recording:
     @property
     def declared(self) -> dict[str, str]:
         """Names of the channels that the rig file declared, and their labels."""
-        labels = {c.name: c.label or c.name.replace("_", " ") for c in self.channels}
-        return {n: labels.get(n, n) for n in self.arrays.names if n not in UNITS}
+        there = {n: c for n, c in self.declared_channels.items() if n in self.arrays.names}
+        return {n: label or n.replace("_", " ") for n, (_, label) in there.items()}
 
     def unit(self, name: str) -> str:
         """Return the unit of the values of ``name``.
@@ -194,10 +196,10 @@ class Recording:
         self._check_channel(name)
         if name in UNITS:
             return UNITS[name]
-        return next(c.unit for c in self.channels if c.name == name)
+        return self.declared_channels[name][0]
 
     def _attributes(self, name: str) -> dict[str, str]:
-        label = next((c.label for c in self.channels if c.name == name), "")
+        _, label = self.declared_channels.get(name, ("", ""))
         return variable_attributes(name, self.unit(name), label)
 
     def _row(self, name: str) -> np.ndarray | None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import h5py
 import numpy as np
 
+from dearig.drivers.channels import RESERVED_NAMES
 from dearig.drivers.rig import Event
 from dearig.progress import Progress, quiet
 from dearig.recording.content.layout import (
@@ -18,9 +20,11 @@ from dearig.recording.content.layout import (
     LINEAR,
     MESSAGE_BYTES,
     REQUIRED,
+    TIMING,
     UNITS,
     ZERO_ORDER,
     attach_time,
+    counts_name,
     create_field,
     lay_out,
     name_dimensions,
@@ -38,6 +42,7 @@ __all__ = ["save_recording"]
 
 #: Samples that are written at once: a multiple of a chunk, and some tens of milliseconds.
 WRITTEN = 2**22
+_COUNTS = counts_name("")
 
 
 def save_recording(
@@ -51,6 +56,8 @@ def save_recording(
     kinematics: str | None = None,
     rest_reading: float = 0.0,
     events: Iterable[Event] = (),
+    channels: Mapping[str, tuple[str, str]] = MappingProxyType({}),
+    timing: tuple[float, float, float] = (0.0, 0.0, 0.0),
     started: float | None = None,
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
@@ -58,17 +65,21 @@ def save_recording(
 ) -> Path:
     """Write arrays as a recording.
 
-    ``values`` are (N,) each, by their names in ``layout.UNITS`` and in those units. ``kind`` is
-    actuator or film, ``hold``, ``average`` and ``kinematics`` are as in ``Recording``,
-    ``rest_reading`` in m has been subtracted from the displacement. ``started`` is the Unix time in
-    s of the first sample, by default ``now()``. ``progress`` gets the part that is written. The
-    file appears complete or not at all. Raises ``InputError`` if it may not be written, and
-    ``ValueError`` for values that no recording of that kind has.
+    ``values`` are (N,) each, by their names in ``layout.UNITS`` and in those units, or of further
+    ``channels``, which have unit and label by name. ``timing`` are skew, delay and the delay's
+    error of the displacement in s. ``kind`` is actuator or film, ``hold``, ``average`` and
+    ``kinematics`` are as in ``Recording``, ``rest_reading`` in m has been subtracted from the
+    displacement. ``started`` is the Unix time in s of the first sample, by default ``now()``.
+    ``progress`` gets the part that is written. The file appears complete or not at all. Raises
+    ``InputError`` if it may not be written, and ``ValueError`` for values that no recording of that
+    kind has.
     """
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r} is not one of {', '.join(KINDS)}")
     missing = [name for name in REQUIRED[kind] if name not in values]
-    unknown = [name for name in values if name not in UNITS]
+    unknown = [name for name in values if name not in UNITS and name not in channels]
+    if taken := [name for name in channels if name in RESERVED_NAMES or name.endswith(_COUNTS)]:
+        raise ValueError(f"recordings use the names {taken} themselves")
     if missing or unknown:
         raise ValueError(f"a recording of kind {kind}: missing {missing}, unknown {unknown}")
     size = np.asarray(values["time"]).size
@@ -86,7 +97,12 @@ def save_recording(
         entry = lay_out(file, kind, metadata.title, started)
         data = entry["data"]
         for number, (name, array) in enumerate(values.items()):
-            field, numbers = create_field(data, name, size), np.asarray(array, dtype=np.float64)
+            unit, label = channels.get(name, ("", ""))
+            field = create_field(data, name, size, unit, label)
+            numbers = np.asarray(array, dtype=np.float64)
+            if name in channels:
+                field.attrs["declared"] = number
+                field.attrs["label"] = fixed(label)
             for first in range(0, size, WRITTEN):
                 progress("writing", (number + first / size) / len(values))
                 field[first : first + WRITTEN] = numbers[first : first + WRITTEN]
@@ -97,6 +113,8 @@ def save_recording(
         if kind == "actuator":
             data["voltage_command"].attrs["hold"] = fixed(ZERO_ORDER if hold else LINEAR)
             data["displacement"].attrs["rest_reading"] = rest_reading
+            if any(timing):
+                data["displacement"].attrs.update(zip(TIMING, timing, strict=True))
         write_sample(entry, metadata)
         for name, text in (("sequence", metadata.sequence_toml), ("model", metadata.model_toml)):
             if text:

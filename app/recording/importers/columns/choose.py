@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from dearig.errors import InputError, Note
@@ -40,6 +40,7 @@ class _Wanted:
     raw: Mapping[str, UnitScale]
     timed: bool
     guess: bool
+    apart: Collection[str] = ()
 
 
 def choose(
@@ -50,6 +51,7 @@ def choose(
     timed: bool,
     table: str | None = None,
     guess: bool = True,
+    apart: Collection[str] = (),
 ) -> Chosen:
     """Return the columns of ``source`` that a recording needs.
 
@@ -57,9 +59,10 @@ def choose(
     scales of the rig file from volts at the card, by quantity, empty without one. A time column is
     not looked for if ``timed``. Only the columns of ``table`` are used if it is given. Of several
     tables, the only one with all the needed columns is used. Without ``guess``, only the columns in
-    ``mapping`` are chosen. Raises ``InputError`` for a wrong ``mapping`` or ``table``.
+    ``mapping`` are chosen; those ``apart`` are never guessed. Raises ``InputError`` for a wrong
+    ``mapping`` or ``table``.
     """
-    wanted = _Wanted(mapping, raw, timed, guess)
+    wanted = _Wanted(mapping, raw, timed, guess, apart)
     tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
     if table is not None:
         if table not in tables:
@@ -124,7 +127,8 @@ def _choose(source: Source, wanted: _Wanted) -> Chosen:
         use_monitor(chosen)
         return chosen
     asked = set(chosen.picked)
-    Guess(chosen, labels, wanted.raw, wanted.timed).fill()
+    free = {name: label for name, label in labels.items() if name not in wanted.apart}
+    Guess(chosen, free, wanted.raw, wanted.timed).fill()
     _leave_other_sizes(chosen, asked)
     return chosen
 

@@ -22,6 +22,7 @@ __all__ = [
     "import_command",
     "label_in",
     "own_name",
+    "take_channels",
 ]
 
 #: What stands in a printed command for a column, and for a unit, that only the user knows.
@@ -67,7 +68,8 @@ class Chosen:
     ``unsure`` are sentences: while there is one, nothing may be imported. ``notes`` say what was
     found without being asked for. ``optional`` are quantities that a recording can do without, and
     that nobody asked for. ``table_choices`` are the tables of which one must be chosen. ``missing``
-    are names of targets for which no column was found.
+    are names of targets for which no column was found. ``channels`` has the name, unit and label of
+    each declared channel, by its key in ``picked``.
     """
 
     source: Source
@@ -78,6 +80,7 @@ class Chosen:
     unsure: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
+    channels: dict[str, tuple[str, str, str]] = field(default_factory=dict)
 
     @property
     def template(self) -> dict[str, str]:
@@ -97,6 +100,15 @@ class Chosen:
     def pairs(self) -> dict[str, str]:
         """Columns by target, with their scales."""
         return {pick.target.name: pick.column + pick.behind for pick in self.picked.values()}
+
+
+def take_channels(chosen: Chosen, channels: Mapping[str, tuple[str, str, str]]) -> None:
+    """Pick the columns of declared ``channels``: name, unit and label by column."""
+    for column, (name, unit, label) in channels.items():
+        if column in chosen.source.names:
+            key = f"channel {name}"  # a channel may be called as a quantity is
+            chosen.channels[key] = name, unit, label
+            chosen.picked[key] = Pick(Target(column, name, unit), column, UnitScale())
 
 
 def import_command(

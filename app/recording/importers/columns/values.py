@@ -55,7 +55,7 @@ class Values:
 
     ``left`` are the places of rows that were left out, by the sample before which they stood.
     ``warnings`` are doubts and ``notes`` what was done to the values. ``start`` is the start of the
-    measurement, where the file tells it.
+    measurement, where the file tells it. ``channels`` has unit and label of declared channels.
     """
 
     kind: str
@@ -64,6 +64,7 @@ class Values:
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     start: Start | None = None
+    channels: dict[str, tuple[str, str]] = field(default_factory=dict)
 
 
 def values_of(
@@ -75,6 +76,7 @@ def values_of(
     can be.
     """
     values = Values(_kind(chosen), {}, notes=list(chosen.notes))
+    values.channels = {name: (unit, label) for name, unit, label in chosen.channels.values()}
     if values.kind == "actuator":
         if "force" in chosen.picked:
             values.warnings.append("the force was not used: actuator data have none")
@@ -82,16 +84,19 @@ def values_of(
             values.warnings.append("gauge length and area are for film data, and were not used")
         if "displacement" not in chosen.picked:
             raise _no_column(chosen, "displacement")
-        found = _read(chosen, values, ["time", "voltage", "displacement", *OPTIONAL], rate_Hz,
-                      skip_bad_rows)  # fmt: skip
+        wanted = ["time", "voltage", "displacement", *OPTIONAL, *chosen.channels]
+        found = _read(chosen, values, wanted, rate_Hz, skip_bad_rows)
         values.columns = {
             "time": found["time"],
             "displacement": found["displacement"],
             "voltage_command": found["voltage"],
-        } | {OPTIONAL[q]: found[q] for q in OPTIONAL if q in found}
+        }
+        values.columns |= {OPTIONAL[q]: found[q] for q in OPTIONAL if q in found}
+        values.columns |= {name: found[key] for key, (name, *_) in chosen.channels.items()}
         return values
-    wanted = ["time", "temperature", *_film_columns(chosen, specimen, values)]
-    found = _read(chosen, values, wanted, rate_Hz, skip_bad_rows)
+    measured = ["time", "temperature", *_film_columns(chosen, specimen, values)]
+    found = _read(chosen, values, [*measured, *chosen.channels], rate_Hz, skip_bad_rows)
+    channels = {name: found.pop(key) for key, (name, *_) in chosen.channels.items()}
     if "strain" in found:
         found["stretch"] = 1.0 + found.pop("strain")
     if specimen.gauge_length_mm is not None and "displacement" in found:
@@ -105,7 +110,7 @@ def values_of(
             f"{chosen.source.path}, {chosen.source.row(int(low[0]))}: stretch is "
             f"{found['stretch'][low[0]]:.6g}; it is length over length at rest, and above 0"
         )
-    values.columns = found
+    values.columns = found | channels
     return values
 
 
