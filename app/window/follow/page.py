@@ -32,7 +32,6 @@ from dearig.report.pages.track import (
     track_headline,
 )
 from dearig.report.text.tables import Table
-from dearig.units import readable
 from dearig.window.follow.hold_panel import HoldPanel
 from dearig.window.follow.jobs import (
     FollowRequest,
@@ -301,7 +300,7 @@ class FollowPage(Page):
         notes = () if not tracking.runs else tracking.runs[-1].notes
         self.next_run.show_pieces(
             self._next_texts(followed),
-            tuple(readable(f"{said}.") for said in (*tracking.warnings, *notes)),
+            tuple(f"{said}." for said in (*tracking.warnings, *notes)),
         )
         self.runs.show_table(runs_table(outcome))
         self.errors.show_runs(tracking.runs)
@@ -327,7 +326,7 @@ class FollowPage(Page):
                 "It is within all limits. Every run is armed by itself: click Show on Run, look at "
                 "its plan there, then Arm and Start."
             )
-        pieces += [readable(f"Not reachable: {part.sentence}.") for part in missed]
+        pieces += [f"Not reachable: {part.sentence}." for part in missed]
         if followed.margins:
             pieces.append(limits_table(followed.margins))
         return pieces
