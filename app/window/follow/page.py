@@ -414,7 +414,7 @@ class FollowPage(Page):
         inner.addWidget(self.nearest)
         inner.addWidget(self.job)
         frame = card(inner)
-        frame.setMinimumWidth(280)
+        frame.setMinimumWidth(270)
         return frame
 
     def _make_results(self) -> QWidget:
