@@ -14,12 +14,14 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # before Qt is loaded
 from PySide6.QtCore import (
     QCoreApplication,
     QEvent,
+    QEventLoop,
     QMessageLogContext,
     QSettings,
     Qt,
     QtMsgType,
     qInstallMessageHandler,
 )
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -98,6 +100,17 @@ def press(qtbot: QtBot, step: StepButton) -> None:
     """Click a step towards voltage as an operator does: once it can be, and is seen to be."""
     qtbot.waitUntil(lambda: step.isEnabled() and step.answers, timeout=120_000)
     qtbot.mouseClick(step, Qt.MouseButton.LeftButton)
+
+
+def strike(place: QWidget, *keys: Qt.Key | str) -> None:
+    """Strike keys with the focus at ``place``, by way of the window system as an operator does."""
+    top = place.window()
+    top.activateWindow()
+    while QApplication.focusWindow() is not top.windowHandle():
+        QCoreApplication.processEvents(QEventLoop.ProcessEventsFlag.WaitForMoreEvents)
+    place.setFocus()
+    for key in keys:
+        QTest.keyClick(top.windowHandle(), key)
 
 
 class Answers:
