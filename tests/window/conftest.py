@@ -65,8 +65,8 @@ def end_run(runner: Runner) -> None:
 def pytest_runtest_teardown() -> Generator[None]:
     """Close what a failed test left in any state: nobody is there to answer a question.
 
-    pytest-qt closes the windows before any fixture ends, and destroys them. The thread of a run must
-    have ended by then, or Qt ends the whole process.
+    pytest-qt closes the windows before any fixture ends, and destroys them. The thread of a run
+    must have ended by then, or Qt ends the whole process.
     """
     for widget in QApplication.topLevelWidgets() if QApplication.instance() else ():
         if isinstance(widget, MainWindow):

@@ -65,9 +65,11 @@ class SequenceEditor(QWidget):
         parent: QWidget | None = None,
         *,
         forms: SegmentForms | None = None,
+        explain: bool = True,
     ) -> None:
         super().__init__(parent)
         self._forms = forms or sequence_forms()
+        self._explain = explain  # beside the fields, not only in their tooltips
         self.draft = Draft(toml, file)
         self.form: Form | None = None
         self._form_of: tuple[int, str] | None = None  # row and kind
@@ -277,7 +279,7 @@ class SequenceEditor(QWidget):
         if self._form_of == (row, kind) and self.form is not None:
             self.form.show_values(table)
             return
-        form = Form(self._forms.fields[kind], table, explain=True)
+        form = Form(self._forms.fields[kind], table, explain=self._explain)
         form.changed.connect(self.set_value)
         self._put_form(form, (row, kind))
 

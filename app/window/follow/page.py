@@ -59,7 +59,7 @@ from dearig.window.session.text_file import EditedFile
 
 __all__ = ["FollowPage"]
 
-_LEFT = 330  # px, default width of the left column
+_LEFT = 400  # px, default width of the left column
 _COLUMNS = [520, 340]  # px, of the words and of the error from run to run
 _WITHIN_MAX = 1000.0  # um
 

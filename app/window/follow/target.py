@@ -23,6 +23,7 @@ from dearig.window.session.text_file import EditedFile
 
 __all__ = ["TargetEditor"]
 
+_HEIGHT_MIN = 240  # px: some segments, and the fields of one
 _TABLES = (".csv", ".txt", ".dat")
 _WORDS = EditorWords(
     what="target",
@@ -42,13 +43,14 @@ class TargetEditor(TomlEditor):
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(session, _WORDS, EXAMPLE, parent)
-        self.form = SequenceEditor(self.toml, forms=target_forms())
+        self.form = SequenceEditor(self.toml, forms=target_forms(), explain=False)
         self.form.setMinimumWidth(0)
         self.trouble = Message()
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setFrameShape(QScrollArea.Shape.NoFrame)
         area.setWidget(self.form)
+        area.setMinimumHeight(_HEIGHT_MIN)
         self.tabs = self.put_form(area)
         column = self.layout()
         if column is not None:
