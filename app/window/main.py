@@ -87,6 +87,8 @@ def run_window(
     wake.timeout.connect(_run_interpreter)
     wake.start(_SIGNAL_INTERVAL)
     collector = Collector(application)
+    session.arming.connect(collector.settle)
+    session.running_changed.connect(lambda running: None if running else collector.settle())
     window.show()
     QTimer.singleShot(0, window.offer_unsaved)
     try:

@@ -55,6 +55,8 @@ repeats = 1000
 class Presses(Listener):
     """Hears presses of STOP, and how long the window's thread has worked between them."""
 
+    PAUSE = 0.004  # shorter than any work that counts: one press for each turn of the loop
+
     def __init__(self) -> None:
         self.worked: list[float] = []
         self._before = time.thread_time()
@@ -144,12 +146,15 @@ def heard(act: Callable[[], object]) -> list[tuple[float, float]]:
     return [(1e3 * d, 1e3 * w) for d, w in zip(listener.delays, listener.worked, strict=False)]
 
 
-def measure(ready: bool, folder: Path, only: str) -> dict[str, list[tuple[float, float]]]:
+def measure(
+    ready: bool, folder: Path, only: str, collector: Collector
+) -> dict[str, list[tuple[float, float]]]:
     """Return delays and work in ms by what was done; ``ready``: as the window is."""
     delays: dict[str, list[tuple[float, float]]] = {}
     settings = QSettings(str(folder / "x.ini"), QSettings.Format.IniFormat)
     settings.clear()
     window = MainWindow(Session(folder, settings, theme=LIGHT))
+    window.session.arming.connect(collector.settle)
     if not ready:
         window.idle_pages.close()
     window.resize(1366, 768)
@@ -197,7 +202,7 @@ def main() -> None:
         for ready in (False, True):
             found: dict[str, list[tuple[float, float]]] = {}
             for _ in range(given.repeats):
-                for title, delays in measure(ready, folder, given.only).items():
+                for title, delays in measure(ready, folder, given.only, collector).items():
                     found.setdefault(title, []).extend(delays)
             words = "as it is" if ready else "pages made when opened"
             for title, delays in found.items():

@@ -97,6 +97,8 @@ class _Key(QEvent):
 class Listener(QObject):
     """Hears keys that another thread sends, and how long each was under way."""
 
+    PAUSE = 0.037  #: s between two keys: never in step with the frames
+
     def __init__(self) -> None:
         super().__init__()
         self.delays: list[float] = []
@@ -115,7 +117,7 @@ class Listener(QObject):
         self._thread.join()
 
     def _send(self) -> None:
-        while not self._over.wait(0.037):  # never in step with the frames
+        while not self._over.wait(self.PAUSE):
             QCoreApplication.postEvent(self, _Key())
 
 

@@ -95,7 +95,7 @@ def main() -> None:
         done, failures = run(name, asked.seed, count, deadline, folder)
         total += done
         kept = folder.glob(f"*{TARGETS[name].suffix}")
-        found = sum(path.stem != "current" for path in kept)
+        found = sum(not path.name.startswith("current.") for path in kept)
         print(
             f"{name}: {done} inputs in {time.monotonic() - began:.0f} s, "
             f"{failures} crashes or hangs, {found} findings in {folder}",

@@ -87,6 +87,7 @@ class Source(Protocol):
     group; ``size(column)``, its number of values; ``step_s(columns)``, the time in s from row to
     row, or None, and ``step_from``, the name that it is from; ``cell(index, column)``, the text in
     the file for a value that is no number; ``block``, the cells of the lines above a table;
+    ``scales``, scales that stand beside the values of columns, which may contain them or not;
     ``rows(indices)``, the places of several samples at once;
     ``skipped``, the rows before each one that was left out, and its place in words;
     ``is_finite``, True if ``read`` returns finite numbers only; ``cut_short``, True if columns may

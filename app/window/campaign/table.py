@@ -223,6 +223,8 @@ class CampaignTable(QTableView):
         self.verticalHeader().setDefaultSectionSize(26)
         header = self.horizontalHeader()
         header.setHighlightSections(False)
+        # a header asks of each column whether all rows are selected
+        header.setSelectionModel(QItemSelectionModel(self._rows, header))
         header.setStretchLastSection(True)
         for column, width in enumerate(_WIDTHS):
             header.resizeSection(column, width)

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import cast
 
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QInputMethodEvent, QKeyEvent
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, Slot
+from PySide6.QtGui import QGuiApplication, QInputMethodEvent, QKeyEvent, QWindow
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
@@ -23,6 +23,9 @@ from PySide6.QtWidgets import (
     QTextEdit,
     QWidget,
 )
+from shiboken6 import isValid
+
+from dearig.window.kit.window_filter import WindowFilter, widget_of
 
 __all__ = ["StopKeys"]
 
@@ -30,27 +33,32 @@ _NAMES = {Qt.Key.Key_Escape: "Esc", Qt.Key.Key_Space: "Space"}
 _STROKES = (QEvent.Type.KeyPress, QEvent.Type.KeyRelease, QEvent.Type.ShortcutOverride)
 
 
-class StopKeys(QObject):
+class StopKeys(WindowFilter):
     """Calls ``stop`` with the name of a stop key while ``busy`` returns True.
 
-    ``window`` is the main window: Esc closes others first. ``watch`` is called with True when the
-    rig is armed or a run begins, and with False when neither is so any more: all events of the
-    program pass the filter meanwhile.
+    ``window`` is the main window: Esc closes others first.
     """
 
     def __init__(self, stop: Callable[[str], None], busy: Callable[[], bool], window: QWidget):
-        super().__init__(window)
         self._stop = stop
         self._busy = busy
         self._window = window
-        self._watching = self._installed = False
+        self._typed: QObject | None = None  # what an input method writes into
         self._held: set[int] = set()  # keys that have stopped and are still down
         self._passed: set[int] = set()  # keys that have closed or written something, and are down
+        super().__init__(window)
+        application = cast(QGuiApplication | None, QCoreApplication.instance())
+        if application is not None:
+            application.focusObjectChanged.connect(self._watch_typing)
 
-    def watch(self, watching: bool) -> None:
-        """Begin or end to look at the keys; a key that is still down is taken until its release."""
-        self._watching = watching
-        self._install()
+    @Slot(QObject)
+    def _watch_typing(self, focused: QObject | None) -> None:
+        """Look at what has the focus: an input method writes into it, past the window."""
+        if self._typed is not None and isValid(self._typed):
+            self._typed.removeEventFilter(self)
+        self._typed = focused
+        if focused is not None:
+            focused.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
         kind = event.type()
@@ -61,13 +69,15 @@ class StopKeys(QObject):
                 self._stop(_NAMES[Qt.Key.Key_Space])
                 return True
         elif kind in _STROKES and cast(QKeyEvent, event).key() in _NAMES:
+            if not isinstance(watched, QWindow):
+                return False  # its window has seen it
             return self._stroke(watched, kind, cast(QKeyEvent, event))
         return False
 
-    def _stroke(self, watched: QObject, kind: QEvent.Type, event: QKeyEvent) -> bool:
+    def _stroke(self, window: QWindow, kind: QEvent.Type, event: QKeyEvent) -> bool:
         key, repeated = event.key(), event.isAutoRepeat()
         if kind == QEvent.Type.ShortcutOverride:
-            if key in self._held or (self._busy() and not self._passes(watched, key, repeated)):
+            if key in self._held or (self._busy() and not self._passes(window, key, repeated)):
                 event.accept()  # it comes as a key press then, not as a shortcut
                 return True
             return False
@@ -76,7 +86,6 @@ class StopKeys(QObject):
             if not repeated:
                 self._held.discard(key)
                 self._passed.discard(key)
-                self._install()
             return held
         if not repeated:  # a release may have gone to another program
             self._held.discard(key)
@@ -84,29 +93,27 @@ class StopKeys(QObject):
         if key in self._held:
             return True
         if not self._busy():
-            self._install()
             return False
-        if self._passes(watched, key, repeated):
+        if self._passes(window, key, repeated):
             self._passed.add(key)
             return self._clear_search(key)
         self._held.add(key)
         self._stop(_NAMES[Qt.Key(key)])
         return True
 
-    def _passes(self, watched: QObject, key: int, repeated: bool) -> bool:
+    def _passes(self, window: QWindow, key: int, repeated: bool) -> bool:
         """Return whether the stroke closes or writes something."""
         if repeated and key in self._passed:
             return True
         if key == Qt.Key.Key_Space:
             return _writes()
-        return self._is_open(watched)
+        return self._is_open(window)
 
-    def _is_open(self, watched: QObject) -> bool:
-        """Return whether Esc, on its way to ``watched``, has something to close."""
+    def _is_open(self, window: QWindow) -> bool:
+        """Return whether Esc, on its way to ``window``, has something to close."""
         if QApplication.activePopupWidget() is not None:
             return True
-        # a widget, or the window of the system, which does not know its widgets
-        at = watched.window() if isinstance(watched, QWidget) else QApplication.activeWindow()
+        at = widget_of(window)
         if at is not None and at is not self._window:
             return True
         return _edits_a_cell() or _searches(self._window)
@@ -117,17 +124,6 @@ class StopKeys(QObject):
             return False
         cast(QLineEdit, QApplication.focusWidget()).clear()
         return True
-
-    def _install(self) -> None:
-        wanted = self._watching or bool(self._held)
-        application = QApplication.instance()
-        if application is None or wanted == self._installed:
-            return
-        self._installed = wanted
-        if wanted:
-            application.installEventFilter(self)
-        else:
-            application.removeEventFilter(self)
 
 
 def _writes() -> bool:

@@ -22,11 +22,21 @@ class Collector(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         gc.disable()
-        gc.collect()
-        gc.freeze()  # objects of the start stay alive; later collections skip them
+        self.settle()
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.collect)
         self._timer.start(_INTERVAL)
+
+    @Slot()
+    def settle(self) -> None:
+        """Collect all garbage, and leave what is alive now out of later collections.
+
+        A collection of all objects of the window takes 0.1 s, and STOP would wait for it: it is
+        done before the rig is armed and after a run.
+        """
+        gc.unfreeze()
+        gc.collect()
+        gc.freeze()
 
     @Slot()
     def collect(self) -> None:

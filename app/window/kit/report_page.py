@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
+
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from dearig.report.text.tables import Table
+from dearig.units import readable
 from dearig.window.kit.report_table import ReportTable
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import label
@@ -22,36 +26,43 @@ class ReportPage(QScrollArea):
         self.setFrameShape(QScrollArea.Shape.NoFrame)
         self.show_pieces(())
 
-    def show_pieces(
-        self, pieces: list[str | Table] | tuple[str, ...], warnings: tuple[str, ...] = ()
-    ) -> None:
+    def show_pieces(self, pieces: Sequence[str | Table], warnings: tuple[str, ...] = ()) -> None:
         """Replace the contents."""
+        for step in self.steps(pieces, warnings):
+            step()
+
+    def steps(
+        self, pieces: Sequence[str | Table], warnings: tuple[str, ...] = ()
+    ) -> list[Callable[[], None]]:
+        """Return the steps that replace the contents, one for each piece."""
         inner = QWidget()
         column = QVBoxLayout(inner)
         column.setSpacing(SPACE)
-        widest = 0
-        for piece in pieces:
+
+        def add(piece: str | Table) -> None:
             if isinstance(piece, str):
                 column.addWidget(_paragraph(piece, ""))
-                continue
+                return
             column.addWidget(label(piece.title, "heading"))
             if piece.rows:
                 table = ReportTable(whole=True)
                 table.show_table(piece)
                 column.addWidget(table)
-                widest = max(widest, table.maximumWidth())
+                # the page scrolls sideways and not the table
+                inner.setMinimumWidth(max(inner.minimumWidth(), table.maximumWidth()))
             if piece.note:
                 column.addWidget(_paragraph(piece.note, "muted"))
-        for warning in warnings:
-            column.addWidget(_paragraph(f"! {warning}", "warn"))
-        column.addStretch(1)
-        # the page scrolls sideways and not the table
-        inner.setMinimumWidth(widest)
-        self.setWidget(inner)
+
+        def end() -> None:
+            for warning in warnings:
+                column.addWidget(_paragraph(f"! {warning}", "warn"))
+            column.addStretch(1)
+
+        return [lambda: self.setWidget(inner), *(partial(add, piece) for piece in pieces), end]
 
 
 def _paragraph(text: str, role: str) -> QLabel:
-    made = label(text, role)
+    made = label(readable(text), role)
     made.setWordWrap(True)
     made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     return made

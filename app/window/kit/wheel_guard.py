@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import cast
 
-from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPointF, Slot
-from PySide6.QtGui import QGuiApplication, QWheelEvent, QWindow
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPointF
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractSlider,
     QAbstractSpinBox,
@@ -17,40 +17,26 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dearig.window.kit.window_filter import WindowFilter, widget_of
+
 __all__ = ["WheelGuard"]
 
 _FIELDS = (QAbstractSpinBox, QComboBox, QAbstractSlider, QTabBar)
 
 
-class WheelGuard(QObject):
+class WheelGuard(WindowFilter):
     """Keeps the wheel from every field of the program that does not have the focus.
 
     Fields are spin boxes, lists, sliders and tab bars. What surrounds the field scrolls instead.
     Qt turns the field under the pointer, and gives it the focus: limits and interlocks would be
     changed by a turn of the wheel.
-
-    The guard looks at what the window system sends to the windows, of which there are few events,
-    and not at every event of every object, which took a fifth of the time of a window's tests.
     """
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
-        application = cast(QGuiApplication | None, QCoreApplication.instance())
-        if application is not None:
-            application.focusWindowChanged.connect(self._watch)
-        self._watch()
-
-    @Slot()
-    def _watch(self) -> None:
-        """Look at all windows that there are; a dialog gets the focus once it is shown."""
-        for window in QGuiApplication.topLevelWindows():
-            window.installEventFilter(self)  # a second time changes nothing
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
         if event.type() != QEvent.Type.Wheel or QApplication.activePopupWidget() is not None:
             return False  # a list that is open takes the wheel itself
         wheel = cast(QWheelEvent, event)
-        top = QWidget.find(cast(QWindow, watched).winId())
+        top = widget_of(watched)
         if top is None:
             return False
         below = [*_up_from(top.childAt(wheel.position().toPoint()))]

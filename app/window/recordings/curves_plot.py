@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Slot
@@ -13,6 +14,7 @@ from dearig.recording.reading.marks import marks_in
 from dearig.report.text.numbers import significant
 from dearig.units import SHOWN
 from dearig.window.kit.theme import pen
+from dearig.window.kit.turns import Turns
 from dearig.window.kit.widgets import plain_tip
 from dearig.window.plots.area import PlotArea
 from dearig.window.plots.limit_lines import MarkLine, PlotOverlay
@@ -35,6 +37,7 @@ class CurvesPlot(QWidget):
         self._shown: tuple[Curves, ...] = ()
         self._with_model = True
         self._with_current = False
+        self._turns = Turns(lambda: session.busy, self)
         self.area = PlotArea(session, "Curves of the selected recordings")
         # the measurement gets the most space
         self.plots = [
@@ -64,9 +67,9 @@ class CurvesPlot(QWidget):
     def show_curves(self, curves: Sequence[Curves]) -> None:
         """Draw ``curves``, all of one kind, over their whole time."""
         self._shown = tuple(curves)
-        self._draw()
         self.area.file_stem = self._shown[0].name if len(self._shown) == 1 else "recordings"
-        self.area.auto_range()
+        self._draw()
+        self._turns.add((self.area.auto_range,))
 
     @Slot(bool)
     def show_model(self, shown: bool) -> None:
@@ -83,6 +86,7 @@ class CurvesPlot(QWidget):
     @Slot()
     def _draw(self) -> None:
         theme = self._session.theme
+        self._turns.clear()
         self.marks.set_theme(theme)
         self.marks.show_marks((), with_words=True)
         for plot in self.plots:
@@ -100,27 +104,31 @@ class CurvesPlot(QWidget):
             self.channels.show_values(place, *values)
         if not self._shown:
             return
-        alone = len(self._shown) == 1
         zero = pg.InfiniteLine(0.0, angle=0, pen=pen(theme.muted, dashed=True))
         residual.addItem(zero, ignoreBounds=True)
-        for i, curves in enumerate(self._shown):
-            colour = theme.measured if alone else theme.curves[i % len(theme.curves)]
-            name = "measured" if alone else curves.name
-            # several recordings are named once: their keys would take the height of the plots
-            drive.add_curve(
-                "commanded" if alone else name, theme.command if alone else colour, in_key=alone
-            ).set_points(curves.drive[0], curves.drive[1] * shown.drive_factor)
-            if curves.current is not None:
-                time, amperes = curves.current
-                current.add_curve(
-                    "monitored current" if alone else name,
-                    theme.monitor if alone else colour,
-                    in_key=alone,
-                ).set_points(time, amperes * 1e3)
-            time, measured = curves.measured
-            both.add_curve(name, colour).set_points(time, measured * shown.factor)
-            if not self._with_model or curves.model is None or curves.residual is None:
-                continue
+        self._turns.add(partial(self._draw_one, i, c) for i, c in enumerate(self._shown))
+
+    def _draw_one(self, place: int, curves: Curves) -> None:
+        """Draw ``curves``, which are shown at ``place``."""
+        theme, alone, last = self._session.theme, len(self._shown) == 1, len(self._shown) - 1
+        drive, both, residual, current = self.plots
+        shown = SHOWN[curves.kind]
+        colour = theme.measured if alone else theme.curves[place % len(theme.curves)]
+        name = "measured" if alone else curves.name
+        # several recordings are named once: their keys would take the height of the plots
+        drive.add_curve(
+            "commanded" if alone else name, theme.command if alone else colour, in_key=alone
+        ).set_points(curves.drive[0], curves.drive[1] * shown.drive_factor)
+        if curves.current is not None:
+            time, amperes = curves.current
+            current.add_curve(
+                "monitored current" if alone else name,
+                theme.monitor if alone else colour,
+                in_key=alone,
+            ).set_points(time, amperes * 1e3)
+        time, measured = curves.measured
+        both.add_curve(name, colour).set_points(time, measured * shown.factor)
+        if self._with_model and curves.model is not None and curves.residual is not None:
             beside = theme.models[0] if alone else colour
             time, model = curves.model
             both.add_curve(
@@ -131,13 +139,12 @@ class CurvesPlot(QWidget):
                 time, left * shown.error_factor
             )
         if alone:
-            monitor = self._shown[0].monitor
-            if monitor is not None:
+            if curves.monitor is not None:
                 drive.add_curve("monitor", theme.monitor).set_points(
-                    monitor[0], monitor[1] * shown.drive_factor
+                    curves.monitor[0], curves.monitor[1] * shown.drive_factor
                 )
-            self._events(self._shown[0])
-        elif self._with_model and any(c.model is not None for c in self._shown):
+            self._events(curves)
+        elif place == last and self._with_model and any(c.model is not None for c in self._shown):
             both.add_entry(LegendEntry("model of each recording", theme.muted, dashed=True))
 
     def _events(self, curves: Curves) -> None:

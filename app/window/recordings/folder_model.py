@@ -37,6 +37,15 @@ _Index = QModelIndex | QPersistentModelIndex
 
 SUMMARY = int(Qt.ItemDataRole.UserRole)
 PATH = SUMMARY + 1
+#: Roles that cells have; a view asks for twice as many in each of its drawings.
+_ROLES = (
+    Qt.ItemDataRole.DisplayRole,
+    Qt.ItemDataRole.ToolTipRole,
+    Qt.ItemDataRole.TextAlignmentRole,
+    Qt.ItemDataRole.ForegroundRole,
+    SUMMARY,
+    PATH,
+)
 _ROOT = QModelIndex()
 #: Wait before rows are sorted again after summaries have come: rows must not jump at every one.
 _SETTLE_MS = 300
@@ -257,7 +266,7 @@ class FolderModel(QAbstractTableModel):
         return None
 
     def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        if not index.isValid():
+        if role not in _ROLES or not index.isValid():
             return None
         path = self._rows[index.row()]
         summary, column = self._summaries.get(path), index.column()

@@ -91,6 +91,8 @@ class RecordingsTable(QTableView):
         self.verticalHeader().setDefaultSectionSize(32)
         header = self.horizontalHeader()
         header.setHighlightSections(False)
+        # a header asks of each column whether all rows are selected: 0.2 s for 2000 recordings
+        header.setSelectionModel(QItemSelectionModel(files, header))
         header.setMinimumSectionSize(_WIDTH_MIN)
         header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         header.customContextMenuRequested.connect(self._ask_columns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -15,6 +16,7 @@ from PySide6.QtGui import (
     QShowEvent,
 )
 from PySide6.QtWidgets import (
+    QAbstractScrollArea,
     QApplication,
     QFrame,
     QHBoxLayout,
@@ -37,6 +39,7 @@ from dearig.window.documents.questions import may_close, offer_unsaved
 from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.stop_keys import StopKeys
 from dearig.window.kit.theme import DARK, LIGHT, SPACE, apply, system_theme
+from dearig.window.kit.turns import Turns
 from dearig.window.kit.wheel_guard import WheelGuard
 from dearig.window.kit.widgets import ElidedLabel
 from dearig.window.recordings.library import shared_library
@@ -76,6 +79,7 @@ class MainWindow(QMainWindow):
         self.compilation = Compilation(self)
         self.library = shared_library(session)  # lists the folder while the window is made
         self._pages: dict[type[Page], Page] = {}
+        self._turns, self._drawing = (Turns(lambda: session.busy, self) for _ in range(2))
         self._make_list()
         self.run_page = self.page(RunPage)
         self.sequence_page = self.page(SequencePage)
@@ -158,10 +162,13 @@ class MainWindow(QMainWindow):
         """Give all parts the sizes and places of the first start."""
         for key in ("geometry", "page", GROUP):
             self.session.settings.remove(key)
-        for page in self._pages.values():
-            page.reset_layout()
-        self._default_geometry()
-        self.show_page(self.run_page)
+        self._turns.add(
+            (
+                *(page.reset_layout for page in self._pages.values()),
+                self._default_geometry,
+                lambda: self.show_page(self.run_page),
+            )
+        )
 
     def leave(self) -> None:
         """Close without a question once the rig is safe; for a program that gets a signal.
@@ -207,7 +214,6 @@ class MainWindow(QMainWindow):
             return
         self.session.recovery.close(keep=self._by_signal)
         self._save_state()
-        self.stop_keys.watch(False)
         self.run_page.close_work()  # first: the rig is made safe
         self.idle_pages.close()
         self.compilation.close()
@@ -345,7 +351,7 @@ class MainWindow(QMainWindow):
     def _connect(self) -> None:
         session, run = self.session, self.run_page
         self.bar.stop_pressed.connect(lambda: run.runner.stop(f"STOP on {self._title()}"))
-        run.runner.state_changed.connect(self._watch_keys)
+        run.runner.state_changed.connect(self._apply_colour_scheme)  # one that was chosen meanwhile
         run.runner.ended.connect(self._run_ended, Qt.ConnectionType.QueuedConnection)
         session.recovery.changed.connect(self._unsaved_changed)
         self._unsaved_changed()
@@ -356,7 +362,7 @@ class MainWindow(QMainWindow):
         self.compilation.failed.connect(lambda words: run.alarms.add("warning", words))
         self.planner.progressed.connect(self.sequence_page.preview.show_progress)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
-        session.running_changed.connect(self._watch_keys)
+        session.running_changed.connect(self._apply_colour_scheme)
         self.addActions(run.display.mark_bar.actions())  # the key M on every page
         session.blocks_changed.connect(lambda: self.banners.show_blocks(session.blocks))
         self.banners.show_blocks(session.blocks)
@@ -370,11 +376,6 @@ class MainWindow(QMainWindow):
         return PAGES[self.list.currentRow()].title
 
     @Slot()
-    def _watch_keys(self) -> None:
-        self.stop_keys.watch(self.session.busy)
-        self._apply_colour_scheme()  # one that was chosen meanwhile
-
-    @Slot()
     def _rig_or_folder_changed(self) -> None:
         folder = self.session.folder
         session = self.session
@@ -385,7 +386,14 @@ class MainWindow(QMainWindow):
 
     @Slot(int)
     def _page_changed(self, row: int) -> None:
-        self.stack.setCurrentWidget(self.page(PAGES[row]))
+        page = self.page(PAGES[row])
+        # what takes long to draw is drawn in turns of its own while the rig is busy
+        self._drawing.finish()
+        parts = page.findChildren(QAbstractScrollArea)
+        for part in (page, *parts) if self.session.busy else ():
+            part.setUpdatesEnabled(False)
+        self.stack.setCurrentWidget(page)
+        self._drawing.add(partial(part.setUpdatesEnabled, True) for part in (page, *parts))
         self.session.settings.setValue("page", row)
 
     @Slot(Path)

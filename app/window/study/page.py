@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, Slot
+from PySide6.QtCore import Qt, Slot
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -35,12 +34,14 @@ from dearig.window.jobs.worker import Worker
 from dearig.window.kit.browser import open_in_browser
 from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.theme import SPACE
+from dearig.window.kit.turns import Turns
 from dearig.window.kit.widgets import Message, button, card, label, menu_button, plain_tip, set_role
 from dearig.window.recordings.library import shared_library
 from dearig.window.session.layout_state import remember
 from dearig.window.session.page import Page
 from dearig.window.session.state import Session
 from dearig.window.study.before_after_plot import BeforeAfterPlot
+from dearig.window.study.known_parameters import KnownParameters
 from dearig.window.study.residual_plots import ResidualPlots
 from dearig.window.study.training_table import TrainingPanel, TrainingTable
 from dearig.window.study.trends_panel import TrendsPanel
@@ -69,9 +70,7 @@ class StudyPage(Page):
         self._library = shared_library(session)
         self._worker = Worker(self)
         self._shown: StudyView | None = None
-        self._parts: list[Callable[[], None]] = []  # of the result, not yet on their tabs
-        self._next_part = QTimer(self, singleShot=True, interval=0)
-        self._next_part.timeout.connect(self._show_part)
+        self._turns = Turns(lambda: session.busy, self)
         self._listing = Background(self)
         self._listing.done.connect(self._list_studies)
         self._listing.failed.connect(self._show_trouble)
@@ -131,6 +130,7 @@ class StudyPage(Page):
         form.addRow("&Branches", self.branches)
         form.addRow("S&prings", self.spring)
         form.addRow("D&rive", self.drive)
+        self.known = KnownParameters(self._session)
 
         self.start = button("&Start", "Start the fit or the diagnosis, in the background", True)
         self.start.clicked.connect(self.begin)
@@ -150,6 +150,7 @@ class StudyPage(Page):
         inner.addWidget(self.diagnose)
         inner.addWidget(self.identify)
         inner.addLayout(form)
+        inner.addWidget(self.known)
         inner.addWidget(self.job)
         frame = card(inner)
         frame.setMinimumWidth(frame.minimumSizeHint().width())
@@ -220,7 +221,7 @@ class StudyPage(Page):
     # job
 
     def task(self) -> StudyRequest:
-        """Return the task of the form."""
+        """Return the task of the form. Raises ``InputError`` for a faulty parameter file."""
         return StudyRequest(
             diagnose=self.diagnose.isChecked(),
             train=self.recordings.train,
@@ -230,6 +231,7 @@ class StudyPage(Page):
             drive=self.drive.currentData(),
             limits=self._session.rig_file,
             ended_early=self.ended_early.currentData(),
+            parameters=self.known.stated(),
         )
 
     @Slot()
@@ -242,7 +244,11 @@ class StudyPage(Page):
         if self.job.job is not None:
             return
         self.message.show_text("")
-        task = self.task()
+        try:
+            task = self.task()
+        except InputError as error:
+            self.message.show_text(str(error))
+            return
         self._label_previous()
         job = self._worker.submit(make_study, task, self._session.folder, whole=task.diagnose)
         job.finished.connect(self._finished)
@@ -312,20 +318,18 @@ class StudyPage(Page):
         self.find_studies()
 
     def show_view(self, shown: StudyView) -> None:
-        """Show a result, new or reopened; while the rig is busy, one tab after another."""
+        """Show a result, new or reopened; while the rig is busy, one piece after another."""
         self._shown = shown
-        self.verdict.show_pieces(list(shown.result), shown.warnings)
-        self._parts = [
-            lambda: self.residual.show_residuals(shown.residuals),
-            lambda: self.curves.show_pairs(shown.pairs),
-            lambda: self.ranking.show_pieces(list(shown.ranking)),
-            lambda: self.experiment.show_pieces(list(shown.experiment)),
-        ]
-        if self._session.busy:
-            self._next_part.start()  # STOP is heard in between
-        else:
-            while self._parts:
-                self._parts.pop(0)()
+        self._turns.clear()
+        self._turns.add(
+            (
+                *self.verdict.steps(shown.result, shown.warnings),
+                lambda: self.residual.show_residuals(shown.residuals),
+                lambda: self.curves.show_pairs(shown.pairs),
+                *self.ranking.steps(shown.ranking),
+                *self.experiment.steps(shown.experiment),
+            )
+        )
         for page in (self.ranking, self.experiment):
             self.tabs.setTabVisible(self.tabs.indexOf(page), shown.diagnosed)
         for index in range(self.tabs.count()):
@@ -337,13 +341,6 @@ class StudyPage(Page):
         self.about.show()
         self.tabs.setCurrentWidget(self.verdict)
         self._enable()
-
-    @Slot()
-    def _show_part(self) -> None:
-        if self._parts:
-            self._parts.pop(0)()
-        if self._parts:
-            self._next_part.start()
 
     def _label_previous(self) -> None:
         """Label the result on the page as the previous one; a new study begins."""

@@ -191,7 +191,7 @@ def test_integers_without_sign_and_with_a_gain_of_their_own(tmp_path: Path) -> N
     np.testing.assert_allclose(taken(path).displacement, MOVED, atol=scale)
     with h5py.File(path, "r+") as file:
         file["displacement"].attrs["gain"] = 2.0
-    with refused(r"'m with gain = 2' .*\*FACTOR"):
+    with refused(r"stands gain = 2, .*'displacement_m=displacement\*FACTOR'"):
         imported(path)
 
 

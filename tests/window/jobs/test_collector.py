@@ -36,3 +36,18 @@ def test_what_another_thread_leaves_goes_in_this_one(qtbot: QtBot) -> None:
     collector.close()
     assert gc.isenabled()
     gc.disable()  # as the tests have it
+
+
+def test_what_is_alive_before_the_rig_is_armed_costs_no_later_collection(qtbot: QtBot) -> None:
+    collector = Collector()
+    went: list[int] = []
+    kept = [Ring(went) for _ in range(5000)]
+    collector.settle()
+    assert len(gc.get_objects()) < len(kept)
+    kept.clear()
+    gc.collect()
+    assert went == []
+    collector.settle()  # after the run
+    assert len(went) == 5000
+    collector.close()
+    gc.disable()

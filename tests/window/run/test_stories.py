@@ -29,7 +29,7 @@ from dearig.window.run.page import RunPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from tests.deep import mostly_deep
-from tests.window.conftest import SHORT, press
+from tests.window.conftest import SHORT, press, strike
 
 LEFT = Qt.MouseButton.LeftButton
 RUN_MS = 60_000
@@ -195,7 +195,7 @@ def test_stop_by_key_from_another_page(qtbot: QtBot, window: MainWindow, key: Qt
     window.show_page(window.page(RigPage))
     qtbot.waitUntil(lambda: seconds(page) > 0.0, timeout=RUN_MS)
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
-        qtbot.keyClick(window.page(RigPage), key)
+        strike(window.page(RigPage), key)
     assert ended.args[0].headline == "Stopped"
 
 

@@ -192,6 +192,12 @@ def _asked(
     if own is not None:
         return Pick(target, column, _both(own, scale), _behind(own))
     label = labels[column]
+    if scaled := getattr(source, "scales", {}).get(column):
+        raise InputError(
+            f"{source.path}: beside {column!r} stands {scaled}, and it is not known whether its "
+            f"values contain it: give its scale, such as "
+            f"{shlex.quote(f'{target.name}={column}*2')}, or *1"
+        )
     if label.unknown:
         raise InputError(
             f"{source.path}: {column!r} is in {label.unknown!r} by its name, which is no unit that "

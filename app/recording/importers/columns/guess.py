@@ -78,7 +78,7 @@ class Guess:
             ColumnProposal(self._chosen, self._labels, self._free, self._timed).fill()
             return
         self._check_sheared()
-        self._take_one(LENGTHS, ("displacement",))
+        self._take_one(LENGTHS, ("strain", "displacement"))
         self._take_one(PULLS, PULLS)
         self._take_if_sure("temperature")
         _as_compression(self._chosen, self._labels)
@@ -125,7 +125,9 @@ class Guess:
         if not found:
             return
         strange = quantity != "time" and self._labels[found[0]].unexplained
-        self._accept(quantity, found, "column", several=len(found) > 1 or bool(strange))
+        # what is in % may be a stretch, a stroke, a humidity
+        is_open = len(found) > 1 or bool(strange) or quantity == "strain"
+        self._accept(quantity, found, "column", several=is_open)
 
     def _take_if_sure(self, quantity: str) -> None:
         """Pick the column of a quantity that a recording can do without, if it is sure."""
@@ -188,7 +190,16 @@ class Guess:
         """Pick the first of ``found``, in the unit that it names."""
         column = found[0]
         label = self._labels[column]
-        if _is_own(self._own(column), quantity):
+        scaled: Mapping[str, str] = getattr(self._chosen.source, "scales", {})
+        if column in scaled:
+            target = target_of(target_name(quantity, label.unit or _likely(quantity)))
+            self._chosen.unsure.append(
+                f"beside {column!r} stands {scaled[column]}, and it is not known whether its "
+                f"values contain it: its scale is needed, as "
+                f"{shlex.quote(f'{target.name}={column}*FACTOR')} or *1"
+            )
+            self._propose_scaled(target, column, several)
+        elif _is_own(self._own(column), quantity) and not label.conflict:
             target = target_of(self._own(column))
             self._pick(target, column, target.scale, doubt, is_open=several)
         elif label.raw == quantity:
@@ -254,10 +265,13 @@ class Guess:
             n: label for n in self._free
             if not (label := self._labels[n]).quantities and not label.qualifier
         }  # fmt: skip
-        found = [n for n, label in labels.items() if DIMENSIONS[quantity] in label.dimensions]
+        found = [
+            n for n, label in labels.items()
+            if DIMENSIONS[quantity] in label.dimensions and label.unit != "1"
+        ]  # fmt: skip
         found = found if len(found) < 2 else self._different(found)
         why = "by its unit alone"
-        if not found and quantity != "time" and left:
+        if not found and quantity not in ("time", "strain") and left:
             found = [n for n, label in labels.items() if not label.unit]
             why = "because no other column is left"
             found = found if len(found) == 1 else []

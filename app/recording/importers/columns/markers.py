@@ -14,6 +14,8 @@ __all__ = ["markers_in"]
 FAR, FAR_CODE = 100.0, 2.0
 #: Markers of one column, at most: too near and too far; readings, and different ones, at least.
 _KINDS, _REPEATED, _DIFFERENT = 2, 2, 10
+#: SCPI says 9.9E37 of what is too large, and 9.91E37 of what is no number.
+OVERFLOW = 9.9e36
 _CODES = frozenset({7999.0, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0})
 _NINES = re.compile(r"9{3,}(?:\.9+|\.0)?")
 
@@ -26,6 +28,11 @@ def markers_in(values: np.ndarray, codes_only: bool = False) -> tuple[np.ndarray
     bring far off, both.
     """
     none = np.zeros(values.size, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        overflow = np.abs(values) >= OVERFLOW
+    if overflow.any() and 2 * int(overflow.sum()) < values.size:
+        others, more = markers_in(np.where(overflow, np.nan, values), codes_only)
+        return others | overflow, [*np.unique(values[overflow]).tolist()[:_KINDS], *more]
     if not values.size or not (_is_repeated(values) or _is_code(_extreme(values))):
         return none, []
     size = np.abs(values)
@@ -54,6 +61,8 @@ def markers_in(values: np.ndarray, codes_only: bool = False) -> tuple[np.ndarray
 
 def _is_code(value: float) -> bool:
     """Return True for a number that programs write where there is no reading."""
+    if abs(value) >= OVERFLOW:
+        return True
     return abs(value) in _CODES or _NINES.fullmatch(f"{abs(value):.12g}") is not None
 
 

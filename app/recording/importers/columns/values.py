@@ -21,8 +21,9 @@ from dearig.recording.importers.columns.time_faults import (
     jumps,
     one_clock,
 )
-from dearig.recording.importers.quantities.clock_numbers import by_sixties, counts_days
+from dearig.recording.importers.quantities.clock_numbers import by_sixties, counts_days, epoch_unit
 from dearig.recording.importers.quantities.labels import names_of, suggestion
+from dearig.recording.importers.quantities.units import UNITS
 from dearig.recording.importers.source import (
     GapError,
     NeedsOptionError,
@@ -170,7 +171,10 @@ def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[s
     pull = next((q for q in PULLS if q in there), None)
     if length is None:
         raise _no_column(
-            chosen, "stretch", "or displacement with a gauge length", option="gauge_length_mm"
+            chosen,
+            "stretch",
+            "strain, or displacement with a gauge length",
+            option="gauge_length_mm",
         )
     if pull is None:
         raise _no_column(
@@ -276,7 +280,7 @@ def _read(
     if not good.all():
         table = {q: column[good] for q, column in table.items()}
     if "time" in picked:
-        _check_days(chosen, picked["time"], table["time"])
+        _check_epoch(chosen, picked["time"], table["time"])
         table["time"] = _counted_by_sixties(chosen, picked["time"], table["time"], values)
     found = {
         q: picked[q].scale.apply(column) if q in picked else column for q, column in table.items()
@@ -299,15 +303,28 @@ def _is_clock(source: Source, column: str) -> bool:
     return getattr(source, "labels", {}).get(column) == "time"
 
 
-def _check_days(chosen: Chosen, pick: Pick, time: np.ndarray) -> None:
-    """Raise ``NeedsOptionError`` if ``time`` (n,), in s by its name, counts days from 1900."""
-    if pick.behind or pick.target.unit != "s" or not counts_days(time):
+def _check_epoch(chosen: Chosen, pick: Pick, time: np.ndarray) -> None:
+    """Raise ``NeedsOptionError`` if ``time`` (n,) is not in the unit of its name by its size.
+
+    It counts days from 1900, or the time since 1970 in a shorter unit. (A clock that has run for an
+    hour counts as many microseconds as there are seconds since 1970.)
+    """
+    named = pick.target.unit
+    unit = "d" if named == "s" and counts_days(time) else epoch_unit(time)
+    if pick.behind or not unit or (unit != "d" and not _is_longer(named, unit)):
         return
+    since = "1900, as spreadsheets do" if unit == "d" else "1970"
     raise NeedsOptionError(
-        f"{chosen.source.path}: {pick.column!r} is in s, but its values, {time[0]:.9g} to "
-        f"{time[-1]:.9g}, seem to count days from 1900, as spreadsheets do",
-        answers={"column": f"time_d={pick.column}*1"},
+        f"{chosen.source.path}: {pick.column!r} is in {named}, but its values, {time[0]:.9g} to "
+        f"{time[-1]:.9g}, seem to count {'days' if unit == 'd' else unit} from {since}",
+        answers={"column": f"time_{unit}={pick.column}*1"},
     )
+
+
+def _is_longer(one: str, other: str) -> bool:
+    """Return True if the unit ``one`` of a time is longer than the ``other``."""
+    first, second = UNITS["time"][one], UNITS["time"][other]
+    return first.times * second.over > second.times * first.over
 
 
 def _counted_by_sixties(chosen: Chosen, pick: Pick, time: np.ndarray, values: Values) -> np.ndarray:

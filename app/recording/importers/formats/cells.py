@@ -20,6 +20,7 @@ __all__ = ["cell_of", "complaint_about", "number_in", "with_order"]
 SHOWN = 30
 
 
+_MINUS = str.maketrans(dict.fromkeys(MINUS, "-"))
 #: Sign before the exponent of a number of double precision in Fortran.
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d+$)")
 
@@ -35,7 +36,7 @@ def number_in(cell: str, column: TextColumn) -> float | None:
     """Return the number in ``cell``; of a date and time, seconds. None if it is neither."""
     if column.since is not None:
         return _seconds(cell, column.since, column.day_first)
-    text = cell.replace(MINUS, "-")
+    text = cell.translate(_MINUS)
     if column.thousands and column.thousands in text:
         if not GROUPED.fullmatch(text):
             return None

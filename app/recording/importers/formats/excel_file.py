@@ -11,6 +11,7 @@ import zipfile
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass
 from datetime import date, datetime, timedelta
 from datetime import time as time_of_day
 from pathlib import Path
@@ -27,6 +28,7 @@ from dearig.recording.importers.formats.stored import Stored, StoredColumns
 from dearig.recording.importers.formats.text_layout import TextColumn, TextLayout, layout_of
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.moments import first_moment
+from dearig.recording.importers.quantities.units import unit_of
 from dearig.recording.importers.source import PARSER_FAILURES, listing, printable
 
 if TYPE_CHECKING:
@@ -83,21 +85,51 @@ class ExcelFile(StoredColumns):
             for column in sheet.layout.columns:
                 table = "/".join(filter(None, (before.rstrip("/"), column.group)))
                 lasts = column.place in sheet.durations
+                shown = sheet.shown.get(column.place, Shown())
                 columns[before + printable(column.name)] = Stored(
-                    _load(sheet, column), None, column.own, "s" if lasts else column.unit,
+                    _load(sheet, column, shown.times), None, column.own,
+                    "s" if lasts else column.unit or shown.unit,
                     "time" if lasts or column.since is not None else "", table,
                     cell=_cell(sheet, column), row=sheet.row,
                     began=first_moment(column.since, column.is_open),
                 )  # fmt: skip
-        notes = [note for sheet in sheets for note in sheet.layout.notes]
+        notes = [note for sheet in sheets for note in (*sheet.layout.notes, *sheet.notes())]
         super().__init__(path, "an Excel workbook", columns, notes=notes)
         for sheet in sheets:
             sheet.report = lambda part: self.progress(part)
         self.block = [row for sheet in sheets for row in sheet.layout.block]
 
 
-def _load(sheet: _Sheet, column: TextColumn) -> Callable[[], np.ndarray]:
-    return lambda: sheet.values(column)
+def _load(sheet: _Sheet, column: TextColumn, times: float) -> Callable[[], np.ndarray]:
+    return lambda: sheet.values(column) if times == 1.0 else sheet.values(column) * times
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a number format makes of a number: it shows it ``times`` as large, with a ``unit``."""
+
+    times: float = 1.0
+    unit: str = ""
+
+
+def shown_by(number_format: str) -> Shown:
+    """Return what the number format of a cell makes of a number.
+
+    ``0.0%`` shows 0.125 as 12.5%, ``0.000,`` 3200 as 3.200, and ``0.0" kV"`` adds a unit.
+    """
+    first = number_format.split(";")[0]
+    texts = [text.strip() for text in _QUOTED.findall(first)]
+    plain = _QUOTED.sub("", first)
+    unit = next((text for text in texts if unit_of(text)), "")
+    thousands = _THOUSANDS.search(plain)
+    times = 1000.0 ** -len(thousands[1]) if thousands else 1.0
+    percent = plain.count("%")
+    return Shown(times * 100.0**percent, "%" if percent == 1 else unit)
+
+
+_QUOTED = re.compile(r'"([^"]*)"')
+#: Commas behind the last digit of a number format, each of which divides by a thousand.
+_THOUSANDS = re.compile(r"[0#?](,+)(?![0#?,])")
 
 
 def _cell(sheet: _Sheet, column: TextColumn) -> Callable[[int], str]:
@@ -118,6 +150,7 @@ class _Sheet:
         )
         lines = ["\t".join(_texts(row, self._formulas, _has_number(row))) for row in head]
         self.layout: TextLayout = layout_of("\n".join(lines), "utf-8", path, names_line, ("\t",))
+        self.shown = self._formats()
         self._numbers: dict[int, array[float]] | None = None
         self._wrong: dict[tuple[int, int], str] = {}  # by place of the column and row of the sheet
         self._kept = np.empty(0, dtype=np.int64)  # rows of the sheet of what was read last
@@ -155,6 +188,30 @@ class _Sheet:
         if column.place in self._formulas and (column.place, row) not in self._wrong:
             return _NO_VALUE
         return self._wrong.get((column.place, row), "there is no value")
+
+    def _formats(self) -> dict[int, Shown]:
+        """Return what the number formats of the first row make of its numbers, by place."""
+        at = self.layout.first + 1
+        with _opened(self.path, values=True) as book:
+            sheet = book[self.name]
+            sheet.reset_dimensions()
+            row = next(iter(sheet.iter_rows(min_row=at, max_row=at)), ())
+            formats = {
+                place: shown_by(str(getattr(cell, "number_format", "")))
+                for place, cell in enumerate(row)
+                if isinstance(cell.value, (int, float))
+            }
+        return {place: shown for place, shown in formats.items() if shown != Shown()}
+
+    def notes(self) -> Iterator[str]:
+        """Yield a sentence for each column whose numbers are taken as its cells show them."""
+        for column in self.layout.columns:
+            shown = self.shown.get(column.place, Shown())
+            if shown.times != 1.0:
+                yield (
+                    f"{column.name!r} is taken as its cells show it, {shown.times:g} times the "
+                    f"number in them"
+                )
 
     def _empty_formulas(self, head: Sequence[Sequence[Cell]]) -> frozenset[int]:
         """Return the places of columns with formulas that have no values."""

@@ -10,9 +10,18 @@ from collections.abc import Callable
 import h5py
 import numpy as np
 
+from dearig.recording.importers.formats.stored import rate_step, stated_scale
 from dearig.recording.importers.source import PARSER_FAILURES
 
-__all__ = ["ATTRIBUTE_MAX", "numbers_in", "own_scale", "pickled_texts", "texts_in", "unpacked"]
+__all__ = [
+    "ATTRIBUTE_MAX",
+    "numbers_in",
+    "own_scale",
+    "pickled_texts",
+    "stated_step",
+    "texts_in",
+    "unpacked",
+]
 
 #: Bytes of an attribute that is read.
 ATTRIBUTE_MAX = 2**14
@@ -35,10 +44,10 @@ def numbers_in(owner: h5py.Group | h5py.Dataset, name: str) -> list[float]:
 def _values(owner: h5py.Group | h5py.Dataset, name: str) -> list[object]:
     if name not in owner.attrs:
         return []
-    attribute = owner.attrs.get_id(name)
-    if attribute.get_storage_size() > ATTRIBUTE_MAX:
-        return []
     try:
+        # of an attribute without a value it cannot be asked for
+        if owner.attrs.get_id(name).get_storage_size() > ATTRIBUTE_MAX:
+            return []
         found = np.ravel(owner.attrs[name]).tolist()
     except PARSER_FAILURES:
         return []
@@ -75,21 +84,39 @@ def pickled_texts(owner: h5py.Group | h5py.Dataset, name: str) -> list[str]:
     return found
 
 
-#: Attributes that scale the integers of a converter, of which no convention says how.
-_SCALES = ("gain", "scale", "scaling", "slope", "factor", "calibration", "lsb", "resolution")
-
-
 def own_scale(data: h5py.Dataset) -> str:
-    """Return the attribute that scales the integers of ``data`` in a way of its own, or ""."""
-    if data.dtype.kind not in "iu":
-        return ""
-    return next(
-        (
-            f"{name} = {found[0]:g}" for name in data.attrs
-            if name.lower() in _SCALES and (found := numbers_in(data, name)) and found[0] != 1.0
-        ),
-        "",
-    )  # fmt: skip
+    """Return an attribute that scales ``data`` in a way of which no convention says how, or ""."""
+    told = {
+        name: numbers_in(data, name) or texts_in(data, name)[:1]
+        for name in data.attrs
+        if name not in _OF_CF or not numbers_in(data, name)
+    }
+    return stated_scale(told, integers=data.dtype.kind in "iu")
+
+
+#: Attributes by which CF scales, if they are numbers.
+_OF_CF = ("scale_factor", "add_offset")
+
+
+def stated_step(data: h5py.Dataset) -> float | None:
+    """Return the time in s from row to row that an attribute of ``data`` or its groups gives."""
+    owner = data
+    for _ in range(GROUPS_MAX):
+        for name in owner.attrs:
+            value = next(iter(numbers_in(owner, name)), 0.0)
+            unit = next((u for e in _UNIT_OF for u in texts_in(owner, name + e)[:1]), "")
+            step = rate_step(f"{name}_{unit}" if unit else name, value)
+            if step is not None:
+                return step
+        if owner.name == "/":
+            return None
+        owner = owner.parent
+    return None
+
+
+#: Groups above a dataset in which attributes are looked for, at most.
+GROUPS_MAX = 16
+_UNIT_OF = ("_units", "_unit")
 
 
 def unpacked(data: h5py.Dataset) -> Callable[[np.ndarray], np.ndarray] | None:

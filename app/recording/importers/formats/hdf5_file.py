@@ -14,7 +14,7 @@ from dearig.input_file import open_input
 from dearig.recording.content.layout import FORMAT
 from dearig.recording.content.safe import Refused, check_heaps, checked, item
 from dearig.recording.files import in_words, one_line
-from dearig.recording.importers.formats.hdf5_attributes import own_scale, unpacked
+from dearig.recording.importers.formats.hdf5_attributes import own_scale, stated_step, unpacked
 from dearig.recording.importers.formats.hdf5_attributes import texts_in as _texts
 from dearig.recording.importers.formats.mat_file import OBJECTS
 from dearig.recording.importers.formats.pandas_hdf5 import (
@@ -41,7 +41,7 @@ RANGE_MAX = 10**8
 _GENERIC = frozenset({"data", "raw", "samples", "signal", "value", "values", "y"})
 #: Names of fields that say nothing beside the name of the dataset that they are fields of.
 _GENERIC_FIELDS = _GENERIC - {"y"}
-_UNITS = ("units", "unit", "Units", "Unit", "UNITS", "unit_string")
+_UNITS = ("units", "unit", "Units", "Unit", "UNITS", "unit_string", "unit_symbol")
 _LABELS = ("long_name", "label", "description", "name")
 _COLUMNS = ("columns", "column_names", "channels", "channel_names", "names", "labels")
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -164,8 +164,7 @@ class _Walk:
             group, _, own = table.rpartition(self._between)
         unit = next((u for name in _UNITS for u in _texts(data, name)[:1]), "")
         unit = re.split(r"\s+since\s", unit)[0]
-        if scale := own_scale(data):
-            unit = f"{unit} with {scale}".strip()
+        scaled, step = own_scale(data), stated_step(data)
         label = next((text for name in _LABELS for text in _texts(data, name)[:1]), "")
         known = unit_of(unit)
         if axis and known and "time" in known[1]:
@@ -182,7 +181,7 @@ class _Walk:
                 path,
                 Stored(
                     self._loader(data.name, _flat, unpack, kind), int(data.size), own,
-                    "s" if kind else unit, "time" if kind else label, group,
+                    "s" if kind else unit, "time" if kind else label, group, step, scaled=scaled,
                 ),
             )  # fmt: skip
             return
@@ -193,6 +192,7 @@ class _Walk:
         if rows < width and rows <= ROWS_AS_COLUMNS:
             rows, width, turned = width, rows, not turned
         names = next((n for key in _COLUMNS if len(n := _texts(data, key)) == width), [])
+        told = next((u for key in _UNITS if len(u := _texts(data, key)) == width), [])
         names = names or block_names(data.parent, data.name.rpartition("/")[2], width)
         kind = time_kind(data, "value_type")
         axes = [_texts(data.parent, key)[:1] for key in ("xlabel", "xunit", "ylabel", "yunit")]
@@ -204,10 +204,12 @@ class _Walk:
                 (label,), (unit,) = axes[2 * place : 2 * place + 2]
             elif xy:
                 label = unit = ""
+            elif told:
+                unit = told[place]
             yield inside, Stored(
                 self._loader(data.name, _row(place) if turned else _column(place), unpack, kind),
                 rows, own_name, "s" if kind else unit, "time" if kind else label,
-                path if names else group,
+                path if names else group, step, scaled=scaled,
             )  # fmt: skip
 
     def _in_fields(self, data: h5py.Dataset, path: str) -> Iterator[tuple[str, Stored]]:

@@ -17,7 +17,7 @@ from dearig.errors import InputError
 from dearig.input_file import open_input, parse_json
 from dearig.recording.files import in_words
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
-from dearig.recording.importers.formats.stored import Stored, StoredColumns
+from dearig.recording.importers.formats.stored import Stored, StoredColumns, stated_scale
 from dearig.recording.importers.formats.text_layout import TextColumn
 from dearig.recording.importers.formats.text_lines import encoding_of
 from dearig.recording.importers.importer import Importer
@@ -129,9 +129,10 @@ def _in_object(
     for key, inner in value.items():
         inside = f"{path}.{key}" if path else key
         unit = units.get(key) if isinstance(units, Mapping) else None
+        unit = unit or value.get(f"{key}_unit") or value.get(f"{key}_units")
         one = _described(inner)
         if one is not None:
-            yield inside, _stored(one.values, key, path, one.unit, one.name)
+            yield inside, _stored(one.values, key, path, one.unit, one.name, one.scaled)
             continue
         for name, column in _columns(inner, inside, path, False, depth + 1):
             if name == inside and isinstance(unit, str):
@@ -190,6 +191,7 @@ class _Described:
     values: list[Json]
     name: str
     unit: str
+    scaled: str
 
 
 def _described(value: Json) -> _Described | None:
@@ -201,7 +203,9 @@ def _described(value: Json) -> _Described | None:
     name = next((value[key] for key in _NAMES if isinstance(value.get(key), str)), "")
     unit = next((value[key] for key in _UNITS if isinstance(value.get(key), str)), "")
     others = [key for key, inner in value.items() if isinstance(inner, list) and _is_column(inner)]
-    return _Described(values, str(name), str(unit)) if len(others) == 1 else None
+    if len(others) != 1:
+        return None
+    return _Described(values, str(name), str(unit), stated_scale(value))
 
 
 def _in_objects(
@@ -213,7 +217,10 @@ def _in_objects(
     if all(described):
         for number, one in enumerate(filter(None, described)):
             own = one.name or f"{path.rpartition('.')[2]}[{number}]"
-            yield (f"{path}.{own}" if path else own), _stored(one.values, own, table, one.unit)
+            yield (
+                (f"{path}.{own}" if path else own),
+                _stored(one.values, own, table, one.unit, scaled=one.scaled),
+            )
         return
     if any(isinstance(inner, list) for row in looked_at for inner in row.values()):
         for number, row in enumerate(looked_at):
@@ -300,12 +307,14 @@ def _stored_rows(
     )  # fmt: skip
 
 
-def _stored(values: list[Json], own: str, table: str, unit: str = "", label: str = "") -> Stored:
+def _stored(
+    values: list[Json], own: str, table: str, unit: str = "", label: str = "", scaled: str = ""
+) -> Stored:
     dated = _dated(values[:LOOKED_AT])
     unit, label = unit or dated[0], label or dated[1]
     return Stored(
         lambda: _numbers(values), len(values), own, unit, label, table,
-        cell=lambda index: _complaint(values[index]), began=dated[2],
+        cell=lambda index: _complaint(values[index]), began=dated[2], scaled=scaled,
     )  # fmt: skip
 
 

@@ -115,7 +115,10 @@ def variables(raw: bytes) -> dict[str, Value]:
     """
     order = {b"IM": "<", b"MI": ">"}.get(raw[126:HEADER])
     if order is None:
-        raise Damaged("cannot be read as a MAT file: it does not begin with the header of one")
+        raise Damaged(
+            "cannot be read as a MAT file: it does not begin with the header of one (a file of "
+            "version 4 has none: save it again with -v7)"
+        )
     version = struct.unpack_from(f"{order}H", raw, 124)[0]
     if version == VERSION_7_3:
         raise Damaged(

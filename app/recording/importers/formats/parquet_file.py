@@ -12,7 +12,7 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.recording.files import one_line
-from dearig.recording.importers.formats.stored import Stored, StoredColumns
+from dearig.recording.importers.formats.stored import Stored, StoredColumns, stated_scale
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import PARSER_FAILURES, printable
 
@@ -45,7 +45,7 @@ class ParquetFile(StoredColumns):
         if not 0 <= claimed <= UNPACKED_MAX + PACKED_MAX * size:
             raise InputError(f"{path} is not read: its {size} bytes claim {rows} rows")
         columns = {}
-        for place, unit, is_date in found:
+        for place, unit, is_date, scaled in found:
             name = ".".join(place)
             if printable(name) in columns:
                 raise InputError(f"{path}: two columns are called {name!r}; rename one")
@@ -54,6 +54,7 @@ class ParquetFile(StoredColumns):
                 ".".join(place[:-1]),
                 cell=self._cell(name),
                 is_utc=getattr(schema.field(place[0]).type, "tz", None) is not None,
+                scaled=scaled,
             )  # fmt: skip
         super().__init__(
             path, "a Parquet file", columns, separator=".",
@@ -106,19 +107,20 @@ def _as_array(pyarrow: Any, values: Any) -> np.ndarray:
 
 def _fields(
     types: Any, fields: Any, path: tuple[str, ...], depth: int
-) -> Iterator[tuple[tuple[str, ...], str, bool]]:
-    """Yield the path of every column of numbers, its unit, and True if it has dates or times."""
+) -> Iterator[tuple[tuple[str, ...], str, bool, str]]:
+    """Yield the path of every column of numbers, its unit, if it has times, and a stated scale."""
     for field in fields:
         kind, inside = field.type, (*path, field.name)
         if types.is_struct(kind) and depth < DEEPEST:
             yield from _fields(types, [kind.field(i) for i in range(kind.num_fields)], inside,
                                depth + 1)  # fmt: skip
         elif types.is_temporal(kind) and not types.is_interval(kind):
-            yield inside, "s", not types.is_duration(kind)
+            yield inside, "s", not types.is_duration(kind), ""
         elif types.is_floating(kind) or types.is_integer(kind) or types.is_decimal(kind):
             told = field.metadata or {}
             unit = next((told[name] for name in _UNITS if name in told), b"")
-            yield inside, unit.decode("utf-8", "replace"), False
+            texts = {n.decode("utf-8", "replace"): v for n, v in told.items()}
+            yield inside, unit.decode("utf-8", "replace"), False, stated_scale(texts)
 
 
 def _library() -> tuple[Any, Any]:

@@ -14,9 +14,14 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.recording.files import one_line
 from dearig.recording.importers.formats.columns import NamedColumns
-from dearig.recording.importers.source import PARSER_FAILURES, listing, no_such_column
+from dearig.recording.importers.source import (
+    PARSER_FAILURES,
+    NeedsOptionError,
+    listing,
+    no_such_column,
+)
 
-__all__ = ["Stored", "StoredColumns", "as_numbers", "rate_step"]
+__all__ = ["Stored", "StoredColumns", "as_numbers", "rate_step", "stated_scale"]
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,9 @@ class Stored:
         Date and time from which its values count.
     is_utc : bool
         True for dates that are of UTC, False for those of a clock on the wall.
+    scaled : str
+        A scale that the file states beside the values, and of which no convention says whether
+        they contain it, such as ``gain = 2``.
     """
 
     load: Callable[[], np.ndarray]
@@ -59,6 +67,7 @@ class Stored:
     row: Callable[[int], str] | None = None
     began: datetime | None = None
     is_utc: bool = False
+    scaled: str = ""
 
 
 class StoredColumns(NamedColumns[Stored]):
@@ -100,6 +109,20 @@ class StoredColumns(NamedColumns[Stored]):
     def labels(self) -> dict[str, str]:
         """Longer names by column, where the file gives them."""
         return {name: column.label for name, column in self._columns.items() if column.label}
+
+    @property
+    def scales(self) -> dict[str, str]:
+        """Scales that the file states beside the values, by column: with them, or as a setting."""
+        found = {name: column.scaled for name, column in self._columns.items() if column.scaled}
+        for setting, one in self._settings.items():
+            word = _GAIN_OF.fullmatch(one.own.lower())
+            value = None if word is None else self.read_setting(setting)
+            if word is None or value in (None, 1.0):
+                continue
+            for name, column in self._columns.items():
+                if column.own.lower().startswith(word["of"]):
+                    found.setdefault(name, f"{setting} = {value:g}")
+        return found
 
     @property
     def tables(self) -> dict[str, list[str]]:
@@ -145,13 +168,26 @@ class StoredColumns(NamedColumns[Stored]):
                 )
         if timed:
             return next(iter(timed.values())).step_s
-        for name, setting in self._settings.items():
-            value = self.read_setting(name)
-            step = None if value is None else rate_step(setting.own, value)
-            if step is not None:
-                self.step_from = repr(name)
-                return step
-        return None
+        steps: dict[str, float] = {}
+        thinned: list[str] = []
+        for name, one in self._settings.items():
+            if (value := self.read_setting(name)) is None:
+                continue
+            if (step := rate_step(one.own, value)) is not None:
+                steps[name] = step
+            elif _THINNED.match(one.own) and value != 1.0:
+                thinned.append(f"{name!r} is {value:g}")
+        if not steps:
+            return None
+        step = next(iter(steps.values()))
+        self.step_from = repr(next(iter(steps)))
+        if thinned or not np.allclose([*steps.values()], step, rtol=1e-6, atol=0.0):
+            said = [f"{name!r} gives {one:.6g} s from row to row" for name, one in steps.items()]
+            raise NeedsOptionError(
+                f"{self.path}: {listing([*said, *thinned])}: give the rate of the rows",
+                answers={"rate_Hz": "RATE"},
+            )
+        return step
 
     def read_setting(self, name: str) -> float | None:
         """Return the number of the column of one value ``name``; None if it cannot be read."""
@@ -247,6 +283,39 @@ _STEPS = re.compile(
 #: Shortest and longest time in s from row to row that a setting may give.
 STEP_MIN, STEP_MAX = 1e-12, 1e6
 _PER_UNIT = MappingProxyType({"khz": 1e3, "ms": 1e-3, "us": 1e-6})
+
+
+#: Settings by which fewer rows are stored than were sampled.
+_THINNED = re.compile(r"(decimat|down_?sampl|subsampl|thin|stride|reduction)", re.I)
+#: Names of what values are multiplied by, and of what is added to them; the first of whole numbers
+#: only, since it may be said of other values too.
+_OF_INTEGERS = frozenset({"calibration", "lsb", "resolution"})
+_GAINS = frozenset(
+    {"gain", "scale", "scaling", "slope", "factor", "multiplier", "conversion"}
+    | {"scale_factor", "scaling_factor", "conversion_factor"}
+)
+_OFFSETS = frozenset({"offset", "intercept", "add_offset", "y_intercept"})
+#: A setting that is the scale of the column whose name begins as it does: ``voltage_scale``.
+_GAIN_OF = re.compile(rf"(?P<of>[^\W_]\w*?)_?(?:{'|'.join(sorted(_GAINS, reverse=True))})")
+
+
+def stated_scale(told: Mapping[str, object], integers: bool = False) -> str:
+    """Return the first scale or offset that stands beside a column, such as "gain = 2", or "".
+
+    ``told`` is what the file says of the column by name; the column has ``integers`` or others.
+    """
+    for name, value in told.items():
+        plain = re.sub(r"[\s-]+", "_", name.strip().lower())
+        neutral = 0.0 if plain in _OFFSETS else 1.0
+        if plain not in _GAINS | _OFFSETS and not (integers and plain in _OF_INTEGERS):
+            continue
+        try:
+            numbers = np.ravel(np.asarray(value)).astype(np.float64)
+        except (TypeError, ValueError):  # a text, such as a date
+            continue
+        if numbers.size and not (numbers == neutral).all():
+            return f"{name} = {', '.join(f'{number:g}' for number in numbers[:4])}"
+    return ""
 
 
 def rate_step(name: str, value: float) -> float | None:

@@ -18,8 +18,9 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import one_line
-from dearig.recording.importers.formats.stored import Stored, StoredColumns
+from dearig.recording.importers.formats.stored import Stored, StoredColumns, rate_step, stated_scale
 from dearig.recording.importers.importer import Importer
+from dearig.recording.importers.quantities.units import UNITS, unit_of
 from dearig.recording.importers.source import PARSER_FAILURES, printable
 
 if TYPE_CHECKING:
@@ -57,6 +58,9 @@ class TdmsChannels(StoredColumns):
                     f"{path} is damaged: its channels claim {claimed} values, and it has {size} "
                     f"bytes"
                 )
+            self._groups = {
+                group.name: {**file.properties, **group.properties} for group in file.groups()
+            }
             channels = [channel for group in file.groups() for channel in group.channels()]
             starts = [s for c in channels if (s := _started(c)) is not None]
             first = min(starts, key=lambda s: (s.seconds, s.second_fractions), default=None)
@@ -74,18 +78,34 @@ class TdmsChannels(StoredColumns):
 
     def _stored(self, channel: TdmsChannel, first: TdmsTimestamp | None) -> Stored:
         told: Mapping[str, object] = channel.properties
-        step = _number(told.get("wf_increment"))
+        step, unit = _step(channel, self._groups.get(channel.group_name, {}))
         start, started = _number(told.get("wf_start_offset")), _started(channel)
         if started is not None and first is not None:
             start += _seconds(started, first)
         dates = channel.dtype.kind == "M"
         return Stored(
             _loader(self.path, channel.group_name, channel.name), len(channel), channel.name,
-            "s" if dates else str(told.get("unit_string", "")),
+            "s" if dates else unit,
             "time" if dates else str(told.get("description", "")),
-            printable(channel.group_name), step if step > 0.0 else None, start,
-            began=_moment(channel[0]) if dates else None,
+            printable(channel.group_name), step, start,
+            began=_moment(channel[0]) if dates else None, scaled=stated_scale(told),
         )  # fmt: skip
+
+
+def _step(channel: TdmsChannel, above: Mapping[str, object]) -> tuple[float | None, str]:
+    """Return the time in s from row to row, None where nothing gives it, and the unit of a channel.
+
+    ``above`` are the properties of its group and of the file.
+    """
+    told: Mapping[str, object] = channel.properties
+    unit = str(told.get("unit_string", told.get("NI_UnitDescription", "")))
+    if (step := _number(told.get("wf_increment"))) > 0.0:
+        along = unit_of(str(told.get("wf_xunit_string", "")) or "s")
+        scale = UNITS["time"].get(along[0]) if along else None
+        return None if scale is None else step * scale.times / scale.over, unit
+    given = {**above, **told}.items()
+    steps = (rate_step(name, _number(value)) for name, value in given)
+    return next((found for found in steps if found is not None), None), unit
 
 
 def _loader(path: Path, group: str, channel: str) -> Callable[[], np.ndarray]:

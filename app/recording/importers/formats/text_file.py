@@ -145,6 +145,11 @@ class TextFile(NamedColumns[TextColumn]):
         return {name: "time" for name, column in self._columns.items() if column.since is not None}
 
     @property
+    def scales(self) -> dict[str, str]:
+        """Scales that a line above the numbers gives, by column."""
+        return {name: column.scaled for name, column in self._columns.items() if column.scaled}
+
+    @property
     def places(self) -> dict[int, str]:
         """Names by the number of the column in the file, from 1, or by their order in tables."""
         if self._section_of:

@@ -23,6 +23,8 @@ from dearig.recording.importers.formats.text_lines import (
     cells_of,
     holds_data,
     joined,
+    rises,
+    scales_in,
     with_brackets,
 )
 from dearig.recording.importers.quantities.labels import label_of
@@ -70,7 +72,7 @@ class TextColumn:
     place of the dates that belong to times of day. ``day_first`` is the order in its dates, which
     ``is_open`` where their form does not say it: then all of them do. ``undecided``: the sample
     does not say what a point or a comma in its numbers means. ``mixed`` are two cells in which it
-    has two meanings.
+    has two meanings. ``scaled`` is a scale that a line above the numbers gives it: ``x1000``.
     """
 
     name: str
@@ -86,6 +88,7 @@ class TextColumn:
     date_place: int | None = None
     undecided: bool = False
     mixed: tuple[str, str] | None = None
+    scaled: str = ""
 
 
 @dataclass(frozen=True)
@@ -213,9 +216,9 @@ class _Table:
             raise _too_wide(path, self.cells)
         line, names, units = self._names(path, names_line)
         self._check_commas(path, line, names)
-        names = self._behind_row_names(names)
+        names = self._behind_row_names(path, names)
         if self.labview:
-            units = units or self._labview_units()
+            units = units or self._labview_units(names)
         groups = self._groups(line, names)
         columns, notes = self._columns(names, units, groups)
         used = self.first if line < 0 else line
@@ -225,23 +228,32 @@ class _Table:
             if text.strip()
         )
         return TextLayout(
-            encoding, self.delimiter, self.first, line, self.cells, _unique(columns), block,
+            encoding, self.delimiter, self.first, line, self.cells,
+            _unique(self._scaled(line, columns)), block,
             self._step(names, units, block), (*notes, *self._passed_over(line)),
         )  # fmt: skip
 
-    def _behind_row_names(self, names: list[str]) -> list[str]:
+    def _behind_row_names(self, path: Path, names: list[str]) -> list[str]:
         """Return ``names``, moved by one where the first column has the names of rows, as R writes.
 
-        There is a name less than columns, and the first one counts the rows.
+        There is a name less than columns, and the first one counts the rows. Raises ``InputError``
+        where it may be the time as well, and the last column have no name.
         """
         if not names or len(names) != self.cells - 1:
             return names
         first = [row[0] for row in self.sample]
-        counts = first == [str(i) for i in range(1, len(first) + 1)]
+        counts = any(first == [str(i + at) for i in range(len(first))] for at in (0, 1))
         # names of rows are texts, and in quotation marks; a time that counts is not
         quoted = re.match(r'"\d+"[^"]', self.lines[self.first].strip()) is not None
         is_time = "time" in label_of(names[0]).quantities
-        return ["", *names] if counts and (quoted or not is_time) else names
+        if not counts or (is_time and not quoted and not rises([row[1] for row in self.sample])):
+            return names
+        if is_time and not quoted:
+            raise InputError(
+                f"{path}: there are {len(names)} names for {self.cells} columns, and both the "
+                f"first and the second one may be the time: write a name above each column"
+            )
+        return ["", *names]
 
     def _names(self, path: Path, given: int | None) -> tuple[int, list[str], list[str]]:
         """Return the line of the names, the names, and the units below them."""
@@ -325,15 +337,32 @@ class _Table:
                 f"export it again with another sign between columns, such as a semicolon"
             )
 
-    def _labview_units(self) -> list[str]:
+    def _labview_units(self, names: Sequence[str]) -> list[str]:
         """Return the units that the head of a LabVIEW file gives, by the place of the column."""
         rows = (self._split(line) for line in range(self.start, self.first))
-        return next((row for row in rows if row[:1] == ["Y_Unit_Label"]), [])
+        told = iter(next((row for row in rows if row[:1] == ["Y_Unit_Label"]), [""])[1:])
+        # where each signal has times of its own, these have no unit there
+        return ["" if name == "X_Value" else next(told, "") for name in names]
+
+    def _scaled(self, line: int, columns: Sequence[TextColumn]) -> list[TextColumn]:
+        """Return ``columns`` with the scales that a line above the numbers gives them.
+
+        Such a line has x1000 in each column, or numbers behind the word scale or gain.
+        """
+        found: dict[int, str] = {}
+        for number in range(self.start, self.first):
+            if number != line and self.lines[number].strip():
+                found |= scales_in(self._split(number), self.cells)
+        return [replace(column, scaled=found.get(column.place, "")) for column in columns]
 
     def _split(self, line: int) -> list[str]:
-        text = bare(self.lines[line])
+        text = self.lines[line]
+        if not self.delimiter or not text.startswith(self.delimiter):  # its first cell is empty
+            text = bare(text)
         cells = cells_of(text, self.delimiter)
         if text is not self.lines[line] and len(cells) != self.cells:
+            if len(whole := cells_of(self.lines[line], self.delimiter)) == self.cells:
+                return whole  # a column of numbers of rows is called #
             # names in a comment may be separated in another way
             for other in _DELIMITERS:
                 if len(split := cells_of(text, other)) == self.cells:
@@ -472,8 +501,10 @@ class _Table:
         lowered = [name.lower() for name in names]
         if "increment" in lowered and (at := lowered.index("increment")) < len(units):
             return _positive(units[at])
-        steps = [row[1] for row in block if len(row) > 1 and row[0] == "Delta_X"]
-        return _positive(steps[-1]) if self.labview and steps else None
+        told = {row[0]: row[1:] for row in block if len(row) > 1}
+        steps, starts = told.get("Delta_X", ()), told.get("X0", ())
+        one = len(set(map(_positive, steps))) == 1 and len(set(starts)) < 2
+        return _positive(steps[0]) if self.labview and one else None
 
 
 def _positive(text: str) -> float | None:

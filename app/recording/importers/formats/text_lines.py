@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import itertools
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +19,8 @@ __all__ = [
     "encoding_of",
     "holds_data",
     "joined",
+    "rises",
+    "scales_in",
     "with_brackets",
 ]
 
@@ -114,3 +117,39 @@ def with_brackets(cells: Sequence[str]) -> list[str]:
 def bare(line: str) -> str:
     """Return ``line`` without the sign of a comment before it."""
     return line.strip().lstrip("#%/;").strip() if line.strip().startswith(_COMMENTS) else line
+
+
+#: A power of ten behind a sign of multiplication; other numbers behind an x are those of columns.
+_TENS = re.compile(r"[xX*\N{MULTIPLICATION SIGN}]\s*(10*|0?\.0*1|1e[+-]?\d+)", re.I)
+#: A number, and a word before cells with scales.
+_PLAIN = re.compile(r"([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)")
+_SCALE_WORD = re.compile(
+    r"(scale|scaling|gain|factor|multiplier|skalierung|faktor)s?( factors?)?:?", re.I
+)
+
+
+def scales_in(cells: Sequence[str], width: int) -> dict[int, str]:
+    """Return the scales other than 1 by place that the ``cells`` of a line above a table give.
+
+    They are x1000 in each cell, or numbers behind the word scale or gain, which stands above the
+    first of ``width`` columns or before it.
+    """
+    first = cells[0] if cells and _SCALE_WORD.fullmatch(cells[0]) else ""
+    if not first and not all(map(_TENS.fullmatch, filter(None, cells))):
+        return {}
+    shift = 1 if first and len(cells) > width else 0
+    matches = ((_PLAIN if first else _TENS).fullmatch(cell) for cell in cells[shift:])
+    return {
+        place: f"{first} = {match[1]}" if first else match[0]
+        for place, match in enumerate(matches)
+        if match is not None and float(match[1]) != 1.0
+    }
+
+
+def rises(cells: Sequence[str]) -> bool:
+    """Return True if ``cells`` are numbers each of which is larger than the one before."""
+    try:
+        numbers = [float(cell.replace(",", ".")) for cell in cells]
+    except ValueError:
+        return False
+    return all(a < b for a, b in itertools.pairwise(numbers))

@@ -243,10 +243,14 @@ def label_of(name: str, unit: str = "") -> Label:
         raw = next((q for q in quantities if dimensions == ("voltage",) and q in _RAW), "")
         if raw and raw != "voltage_monitor":
             quantities = []
+        if symbol == "pct" and _LENGTHENING.intersection(_words_of(words)):
+            quantities = ["strain"] if quantities == ["displacement"] else quantities
         quantities = [q for q in quantities if DIMENSIONS[q] in dimensions]
     asked = [q for q in said.asked if not found or DIMENSIONS[q] in dimensions]
     qualifier = said.qualifier
-    if match := _COMPUTED.search(words if found else _IN_BRACKETS.sub(" ", bracketed)):
+    less_one = _LESS_ONE if "stretch" in quantities else _COMPUTED
+    without_unit = words if found else _IN_BRACKETS.sub(" ", bracketed)
+    if match := _COMPUTED.search(without_unit) or less_one.search(without_unit):
         asked, qualifier = list(dict.fromkeys([*quantities, *asked])), match[0].strip()
     if asked:  # the word counts for the column, whichever of its words is the quantity
         quantities, raw = [], ""
@@ -258,18 +262,29 @@ def label_of(name: str, unit: str = "") -> Label:
 
 
 #: What says that the values of a column were computed from the quantity in its name: *1000, /2,
-#: d(x)/dt, log10, a square, a sign, peak to peak.
+#: d(x)/dt, log10, a square, a sign, peak to peak, a size, the second Piola-Kirchhoff
+#: stress.
 _COMPUTED = re.compile(
     r"[*\N{MULTIPLICATION SIGN}\N{MIDDLE DOT}]\s*[\d.]+|\b[xX]\s?\d{2,}|/\s*\d+(?:\.\d+)?\s*$"
     r"|\^|[\N{SUPERSCRIPT TWO}\N{SUPERSCRIPT THREE}\N{SQUARE ROOT}\N{PARTIAL DIFFERENTIAL}]"
     r"|^\s*[-\N{MINUS SIGN}]\s*(?=[^\W\d])|\bd\s*\[|/\s*dt\b|\blog\s?\d+|\b[pP]-[pP]\b"
+    r"|\b2(?:nd|\.)?\s*PK\b|\|[^|]+\|"
+)
+
+
+#: A stretch minus 1 is a strain; behind another name the 1 is a number.
+_LESS_ONE = re.compile(r"[-\N{MINUS SIGN}]\s*1\s*$")
+#: Words of a displacement that in % is a part of the length; a stroke in % is one of its range.
+_LENGTHENING = frozenset(
+    ["elongation", "extension", "allongement", "verlangerung", "langenanderung", "alargamiento"]
 )
 
 
 def _unknown_unit(name: str) -> str:
     """Return a short text in brackets at the end of ``name``, which may be a unit, or ""."""
     bracketed = name.strip().translate(_BRACKETS)
-    inside = _IN_BRACKETS.findall(bracketed)[-1].strip() if bracketed.endswith("]") else ""
+    found = _IN_BRACKETS.findall(bracketed) if bracketed.endswith("]") else []
+    inside = found[-1].strip() if found else ""
     return inside if len(inside) <= UNIT_MAX and _UNIT_LIKE.match(inside) else ""
 
 

@@ -25,7 +25,8 @@ _HARMFUL = _set(
     circumferential hoop shear schub scher cisaillement flexure flexural bending biege torsion
     torsional static dynamic statisch dynamisch residual plastic plastisch elastic friction reib
     normal blocked blocking yield ultimate break fracture bruch rupture offset drift noise
-    rauschen difference envelope onset spitzen spitze maximale pk pp sp sd eff avg squared"""
+    rauschen difference envelope onset spitzen spitze maximale pk pp sp sd eff avg squared
+    response rise fall settling dwell exposure integration latency remaining"""
 )
 #: Words of shear, which no model here describes.
 SHEAR = _set("shear schub scher cisaillement")

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 
 __all__ = ["GROUPED", "MINUS", "Signs", "is_number", "signs_of"]
 
-#: The minus of typography, which some programs write.
-MINUS = "\N{MINUS SIGN}"
+#: The minus of typography, and the dash that spreadsheets make of a hyphen.
+MINUS = "\N{MINUS SIGN}\N{EN DASH}"
 #: Signs between groups of digits that are no decimal sign anywhere.
 _BETWEEN = "' \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{RIGHT SINGLE QUOTATION MARK}"
 _TAIL = r"(?:[eEdD][+-]?\d+)?|[+\-−]?(?:nan|inf|infinity)"  # noqa: RUF001

@@ -141,9 +141,16 @@ _WRITTEN_OUT = MappingProxyType(
 WIDE_BRACKETS = "\N{FULLWIDTH LEFT PARENTHESIS}\N{FULLWIDTH RIGHT PARENTHESIS}"
 
 
+#: Letters of Russian units, and their prefix for a millionth.
+_CYRILLIC = str.maketrans("смкниечгаВНПМАГК", "smkniehgaVNPMAGK")
+_MICRO = "мк"
+
+
 def unit_of(text: str) -> tuple[str, tuple[str, ...]] | None:
     """Return the symbol of a unit that is written as ``text``, and its dimensions; else None."""
     text = text.strip().strip(f"()[]{WIDE_BRACKETS}").strip()
+    if not text.isascii():
+        text = text.replace(_MICRO, "u").translate(_CYRILLIC)
     symbol = ALIASES.get(text) or _WRITTEN_OUT.get(text.lower(), text)
     dimensions = tuple(d for d, units in UNITS.items() if symbol in units)
     return (symbol, dimensions) if dimensions else None
