@@ -199,9 +199,12 @@ class TextFile(NamedColumns[TextColumn]):
     def _read_section(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         while True:
             wanted = [self._ordered(name) for name in dict.fromkeys(names)]
+            wrong: _WrongCellError | None = None
             try:
                 table = self._read_rows(wanted, self._skip)
-            except _WrongCellError as wrong:
+            except _WrongCellError as error:
+                wrong = error.with_traceback(None)  # which would keep the rows that were read
+            if wrong is not None:
                 if wrong.grouped and self._decide(wrong.column):
                     continue
                 if wrong.column in self.optional:
@@ -226,7 +229,7 @@ class TextFile(NamedColumns[TextColumn]):
         """
         self.skipped, self._spans, self._wanted, self._pointed = [], [], wanted, set()
         self._leaves_out, self._counts = skip, counts
-        table = Table(len(wanted))
+        table = Table(0 if counts else len(wanted))
         size = left = self._size
         for line, block, values in self._parsed():
             self._keep(line, block, values, table, left)

@@ -15,7 +15,8 @@ ROOM = 1.05
 class Table:
     """Columns that grow by blocks of rows; ``rows`` of them are there.
 
-    Each has memory of its own, which is given back once nobody needs that column any more.
+    Each has memory of its own, which is given back once nobody needs that column any more. A table
+    of no ``width`` counts the rows only.
     """
 
     def __init__(self, width: int) -> None:
@@ -31,12 +32,11 @@ class Table:
         """Append rows; ``more`` times as many are expected, with these."""
         count = columns[0].size if columns else 0
         end = self.rows + count
-        for place, values in enumerate(columns):
-            room = self._room[place]
+        for place, (room, values) in enumerate(zip(self._room, columns, strict=False)):
             if end > room.size:
                 # room that is never written takes no memory
                 grown = np.empty(self.rows + int(count * max(more, 1.0) * ROOM) + 1)
                 grown[: self.rows] = room[: self.rows]
-                self._room[place] = room = grown
-            room[self.rows : end] = values
+                self._room[place] = grown
+            self._room[place][self.rows : end] = values
         self.rows = end
