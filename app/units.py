@@ -11,12 +11,15 @@ __all__ = [
     "SHOWN_CHANNELS",
     "Shown",
     "ShownChannel",
+    "in_digits",
     "name_and_unit",
     "parameter_key",
     "parameter_unit",
     "readable",
 ]
 
+#: A number of thousands that was rounded to a few digits; no part of a name.
+_ROUNDED = re.compile(r"(?<![\w.+/\\-])-?\d(?:\.\d+)?e\+0[1-5](?![\w/\\]|\.\w)")
 #: Unit at the end of a key, and the unit as it is printed.
 _KEY_UNITS = MappingProxyType({
     "kV_per_s": "kV/s", "MV_per_m": "MV/m", "V_per_us": "V/µs", "V_per_kV": "V/kV",
@@ -119,8 +122,14 @@ def parameter_key(name: str, unit: str) -> str:
     return f"{stem}_{ending}" if ending else stem
 
 
+def in_digits(text: str) -> str:
+    """Return ``text`` with numbers like 1.8e+04, up to a million, written as 18000."""
+    return _ROUNDED.sub(lambda number: f"{float(number[0]):.0f}", text)
+
+
 def readable(text: str) -> str:
-    """Return ``text`` with um, us, uA and +- written as µm, µs, µA and ±."""
+    """Return ``text`` with um, us, uA and +- written as µm, µs, µA and ±, and numbers in digits."""
+    text = in_digits(text)
     text = re.sub(r"(?<=\d) u(?=[msA]\b)", " \N{MICRO SIGN}", text)
     return re.sub(r"\+- ?(?=\d)", "\N{PLUS-MINUS SIGN}", text)
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 import unicodedata
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dearig.printable import PrintableStream, printable
+from dearig.units import in_digits
 
 
 def test_what_a_terminal_obeys_is_shown_as_an_escape() -> None:
@@ -47,3 +49,17 @@ def test_a_stream_passes_lines_and_no_controls() -> None:
     stream.writelines(["b\n", "\x07"])
     assert raw.getvalue() == "a\\x1b[0m\nb\n\\x07"
     assert stream.isatty() is False
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("an error of 1.8e+04 um", "an error of 18000 um"),
+        ("-2e+03, and no more.", "-2000, and no more."),
+        ("1.8e+04.", "18000."),
+        ("3e+09 samples, 2e-05 s", "3e+09 samples, 2e-05 s"),
+        ("run-1e+04.h5, a/1e+04/b, x1e+04", "run-1e+04.h5, a/1e+04/b, x1e+04"),
+    ],
+)
+def test_thousands_are_written_in_digits(text: str, shown: str) -> None:
+    assert in_digits(text) == shown

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from dearig.analysis.outcomes import (
 from dearig.analysis.readings.compatibility import of_rig
 from dearig.analysis.readings.opening import open_all
 from dearig.analysis.residual import even, spectrum
+from dearig.config.parameterfile import Stated
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.residual import Dependence, MissingStress, Signature
@@ -40,7 +41,8 @@ class StudyRequest:
     ``drive`` command or monitor. ``train`` are fitted, ``validation`` read once at the end.
     ``limits`` is the rig file within whose limits an experiment is proposed; film and load are
     those of the recordings. ``ended_early`` is keep, cut or leave-out: what is done with recordings
-    whose runs ended early.
+    whose runs ended early. ``parameters`` is what is known of parameters, as in a
+    parameter file.
     """
 
     diagnose: bool
@@ -51,6 +53,7 @@ class StudyRequest:
     drive: str = "command"
     limits: RigFile | None = None
     ended_early: str = "keep"
+    parameters: Stated = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -116,13 +119,14 @@ def study(
     if task.diagnose:
         found = diagnose_recordings(
             train, validation=task.validation, branches=task.branches, drive=task.drive,
-            rig_file=_rig_of(task.limits, train), ended_early=task.ended_early, clock=clock,
-            progress=progress,
+            rig_file=_rig_of(task.limits, train), parameters=task.parameters,
+            ended_early=task.ended_early, clock=clock, progress=progress,
         )  # fmt: skip
     else:
         found = identify_recordings(
             train, validation=task.validation, branches=(task.branches,), spring=task.spring,
-            drive=task.drive, ended_early=task.ended_early, clock=clock, progress=progress,
+            drive=task.drive, parameters=task.parameters, ended_early=task.ended_early,
+            clock=clock, progress=progress,
         )  # fmt: skip
     where = numbered_folder(folder, "study")
     model, report = where / "model.toml", where / "report.html"

@@ -39,6 +39,7 @@ from dearig.cli.output import with_hints
 from dearig.command_line import without_secrets
 from dearig.errors import DearigError, DiskFault, InputError, Interrupted
 from dearig.printable import MESSAGE_MAX, PrintableStream, printable
+from dearig.units import in_digits
 
 __all__ = ["app", "main"]
 
@@ -336,7 +337,7 @@ def _usage(error: TyperException) -> str:
 
 def _say(message: str) -> None:
     log.info("message: %s", message)
-    sys.stderr.write(f"dearig: {printable(message, most=MESSAGE_MAX)}\n")
+    sys.stderr.write(f"dearig: {printable(in_digits(message), most=MESSAGE_MAX)}\n")
 
 
 # ---------------------------------------------------------------- unexpected errors

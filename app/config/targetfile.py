@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal
@@ -19,13 +19,23 @@ import tomli_w
 
 from dearig.config.segments import SEGMENT_KINDS, SegmentTable
 from dearig.config.segments.waveform import Csv
-from dearig.config.sequencefile import LoadedSequence, read_sequence
+from dearig.config.sequencefile import LoadedSequence, SequenceFault, read_sequence
 from dearig.config.toml_input import parse_toml, read_text, shown
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.simulation.excitation import Sampled, Sequence
 
-__all__ = ["EXAMPLE", "LoadedTarget", "load_target", "parse_target", "target_of"]
+__all__ = [
+    "EXAMPLE",
+    "LoadedTarget",
+    "as_millimetres",
+    "load_target",
+    "millimetre_key",
+    "parse_target",
+    "read_target",
+    "target_kinds",
+    "target_of",
+]
 
 _M = 1e-6  # m per V: a target is read as a sequence in which 1 kV means 1 mm
 
@@ -71,7 +81,8 @@ class _Displacement(Csv):
     kind: Literal["csv"]
 
 
-def _kinds() -> Mapping[str, type[SegmentTable]]:
+def target_kinds() -> Mapping[str, type[SegmentTable]]:
+    """Return the kinds of segment by name; their keys are those of a sequence, in kilovolts."""
     return MappingProxyType({**SEGMENT_KINDS, "csv": _Displacement})
 
 
@@ -92,7 +103,7 @@ class LoadedTarget:
         try:
             time, volts = self.sequence.sample(rate)
         except InputError as error:
-            raise InputError(_as_millimetres(str(error))) from error
+            raise InputError(as_millimetres(str(error))) from error
         edges = self.sequence.sequence.boundaries
         lead_in = int(np.searchsorted(time, edges[0]))
         tail = time.size - int(np.searchsorted(time, edges[-1], side="right"))
@@ -108,7 +119,7 @@ def target_of(time: np.ndarray, displacement: np.ndarray, name: str = "target") 
         path = Sampled(np.asarray(time), np.asarray(displacement, dtype=np.float64) / _M)
         sequence = Sequence(name, (path,), labels=("arrays",))
     except ModelError as error:
-        said = _as_millimetres(str(error)).replace("csv: ", "")
+        said = as_millimetres(str(error)).replace("csv: ", "")
         raise InputError(f"target {name!r}: {said}") from error
     loaded = LoadedSequence(sequence, "", (0.0,), (0,))
     return LoadedTarget(name, f"# {path.times.size} points from Python\n", loaded)
@@ -128,17 +139,36 @@ def load_target(path: str | Path) -> LoadedTarget:
 
 def parse_target(text: str, name: str, folder: Path) -> LoadedTarget:
     """Return the target in the TOML ``text``; ``name`` and ``folder`` as of a sequence."""
+    loaded, faults = read_target(text, name, folder)
+    if loaded is None:
+        more = len(faults) - 1
+        tail = f" ({more} more fault{'s' if more > 1 else ''} after that)" if more else ""
+        raise InputError(f"{name}: {faults[0].sentence}{tail}")
+    return loaded
+
+
+def read_target(
+    text: str, name: str, folder: Path
+) -> tuple[LoadedTarget | None, tuple[SequenceFault, ...]]:
+    """Return the target in the TOML ``text``, or None and all of its faults.
+
+    Raises ``InputError`` for a text that is no TOML, or whose keys are voltages.
+    """
     data = parse_toml(text, name)
     tables = data.get("segment")
     if isinstance(tables, list):
         data["segment"] = [_as_kilovolts(table, f"{name}: segment {i + 1}") for i, table in
                            enumerate(tables)]  # fmt: skip
-    loaded, faults = read_sequence(tomli_w.dumps(data), name, folder, _kinds())
-    if loaded is None:
-        more = len(faults) - 1
-        tail = f" ({more} more fault{'s' if more > 1 else ''} after that)" if more else ""
-        raise InputError(f"{name}: {_as_millimetres(faults[0].sentence)}{tail}")
-    return LoadedTarget(loaded.sequence.name, text, loaded)
+    loaded, found = read_sequence(tomli_w.dumps(data), name, folder, target_kinds())
+    faults = tuple(
+        replace(
+            fault, sentence=as_millimetres(fault.sentence), words=as_millimetres(fault.words),
+            key=fault.key and millimetre_key(fault.key),
+        )
+        for fault in found
+    )  # fmt: skip
+    made = None if loaded is None else LoadedTarget(loaded.sequence.name, text, loaded)
+    return made, faults
 
 
 def _as_kilovolts(table: Any, where: str) -> Any:
@@ -148,7 +178,7 @@ def _as_kilovolts(table: Any, where: str) -> Any:
     found = {}
     for key, value in table.items():
         if key.endswith(("_kV", "_V")):
-            meant = _as_millimetres(re.sub("_V$", "_kV", key))
+            meant = as_millimetres(re.sub("_V$", "_kV", key))
             raise InputError(
                 f"{where}: {key} = {shown(value)} is a voltage, and a target is a displacement: "
                 f"write {meant}"
@@ -163,7 +193,12 @@ _UNIT = re.compile(r"(?<![\w/\\.-])kV\b(?![/\\.])")
 _WORD = re.compile(r"(?<![\w/\\.-])voltage(s?)\b(?![/\\.])")
 
 
-def _as_millimetres(sentence: str) -> str:
+def millimetre_key(key: str) -> str:
+    """Return the key of a target that stands for the ``key`` of a sequence."""
+    return as_millimetres(key) if _KEY.fullmatch(key) else key
+
+
+def as_millimetres(sentence: str) -> str:
     """Return a sentence on a sequence as one on a target."""
     sentence = _KEY.sub(
         lambda key: "displacement_mm" if key[1] == "voltage" else f"{key[1]}_mm", sentence

@@ -217,7 +217,11 @@ def test_info_shows_them(folder):
     told = {c["name"]: c for c in describe(recording)["channels"]}
     assert told["load_cell"]["unit"] == "N"
     assert told["load_cell"]["label"] == "Load cell"
-    assert dict(describe_rows(recording))["Load cell"].endswith(" N")
+    rows = dict(describe_rows(recording))
+    assert rows["Load cell"].endswith(" N")
+    # both ends of a range have the digits of the larger one
+    low, _, high = rows["voltage monitor"].removesuffix(" kV").partition(" to ")
+    assert len(low.partition(".")[2]) == len(high.partition(".")[2]) == 3
     assert "Load cell" in done("info", folder / "run.h5").out
 
 

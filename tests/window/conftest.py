@@ -30,6 +30,7 @@ from dearig.drivers.settings import LimitsSettings
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.run.controls import StepButton
 from dearig.window.run.page import RunPage
+from dearig.window.run.runner import Runner
 from dearig.window.sequence.planner import Planner
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
@@ -52,15 +53,27 @@ frequency_Hz = 2.0
 """
 
 
+def end_run(runner: Runner) -> None:
+    """End the run or campaign of ``runner``, and wait for its thread."""
+    while runner.running:
+        runner.stop("the end of the test")
+        runner.wait()
+        QCoreApplication.processEvents()
+
+
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_teardown() -> Generator[None]:
     """Close what a failed test left in any state: nobody is there to answer a question.
 
-    pytest-qt closes the windows before any fixture ends.
+    pytest-qt closes the windows before any fixture ends, and destroys them. The thread of a run
+    must have ended by then, or Qt ends the whole process.
     """
     for widget in QApplication.topLevelWidgets() if QApplication.instance() else ():
         if isinstance(widget, MainWindow):
             widget.leave()
+            end_run(widget.run_page.runner)
+        elif isinstance(widget, RunPage):
+            end_run(widget.runner)
     yield
 
 

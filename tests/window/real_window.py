@@ -92,7 +92,14 @@ def until(condition: Callable[[], bool], what: str) -> None:
     late.start(PATIENCE)
     loop.exec()
     if not condition():
-        raise SystemExit(f"waited in vain: {what}")
+        said = ""
+        for window in QApplication.topLevelWidgets():
+            if isinstance(window, MainWindow):
+                said = f"; the window says: {window.status.full_text}, {window.bar.detail.text()}"
+                window.leave()
+                window.run_page.runner.wait()  # its thread must not be destroyed while it runs
+                end(window)
+        raise SystemExit(f"waited in vain: {what}{said}")
 
 
 def end(window: MainWindow) -> None:
@@ -129,6 +136,8 @@ def main() -> None:
     until(lambda: page.operator.text() == "ada", "the operator's name")
     saw["operator"] = session.operator
     saw["planned"] = page.display.view.words.text()
+    # a click while the window makes a page is dropped, as one that could not be answered
+    until(lambda: window.idle_pages.done, "all pages")
     click(page.arm_button)
     until(page.start_button.isEnabled, "armed")
     saw["armed"] = window.bar.badge.state.name

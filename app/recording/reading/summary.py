@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any
@@ -135,6 +136,7 @@ def _channel(recording: Recording, name: str) -> dict[str, Any]:
     return told
 
 
+_DECIMALS_MAX = 6
 #: Factors and units in which values are shown to people.
 _READABLE = MappingProxyType(
     {
@@ -148,6 +150,17 @@ _READABLE = MappingProxyType(
         "temperature": (1.0, "°C"),
     }
 )
+
+
+def _span(low: float, high: float) -> str:
+    """Return the ends of a range, both to four digits of the larger one."""
+    largest = max(abs(low), abs(high))
+    decimals = 3 - math.floor(math.log10(largest)) if largest else 0
+    if decimals > _DECIMALS_MAX:
+        return f"{low:.4g} to {high:.4g}"
+    # + 0.0 turns a negative zero into zero
+    ends = (f"{round(end, decimals) + 0.0:.{max(decimals, 0)}f}" for end in (low, high))
+    return " to ".join(ends)
 
 
 def describe_rows(recording: Recording) -> list[tuple[str, str]]:
@@ -172,7 +185,7 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
     for channel in d["channels"]:
         scale, unit = _READABLE.get(channel["name"], (1.0, channel["unit"]))
         if channel["min"] is not None:
-            span = f"{channel['min'] * scale:.6g} to {channel['max'] * scale:.6g} {unit}"
+            span = f"{_span(channel['min'] * scale, channel['max'] * scale)} {unit}"
             shown = channel.get("label", channel["name"].replace("_", " "))
             rows.append((shown, span.rstrip()))
     if d["environment"] is not None:

@@ -49,10 +49,10 @@ class CampaignControls(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(SPACE)
-        column.addLayout(self._queue_row())
+        column.addLayout(self._queue_rows())
         inner = QVBoxLayout()
         inner.setSpacing(SPACE // 2)
-        inner.addLayout(self._batch_row())
+        inner.addLayout(self._batch_rows())
         inner.addWidget(self._halt_row())
         self.blocked = Message()
         inner.addWidget(self.blocked)
@@ -111,21 +111,22 @@ class CampaignControls(QWidget):
 
     # layout
 
-    def _queue_row(self) -> QHBoxLayout:
+    def _queue_rows(self) -> QVBoxLayout:
         self.pause = button("Pa&use after this run", "Start no run until Go on is pressed")
         self.go_on = button("&Go on", "Start the next run")
         self.end = button("End a&fter this run", "End the campaign at 0 V; it can be continued")
         self.first = button("Play ne&xt", "Play the selected runs before all others that wait")
         self.skip = button("&Leave out", "Leave the selected runs out")
-        row = QHBoxLayout()
-        row.addWidget(self.first)
-        row.addWidget(self.skip)
-        row.addStretch(1)
-        for made in (self.pause, self.go_on, self.end):
-            row.addWidget(made)
-        return row
+        rows = QVBoxLayout()
+        for made in ((self.first, self.skip), (self.pause, self.go_on, self.end)):
+            row = QHBoxLayout()
+            for part in made:
+                row.addWidget(part)
+            row.addStretch(1)
+            rows.addLayout(row)
+        return rows
 
-    def _batch_row(self) -> QHBoxLayout:
+    def _batch_rows(self) -> QVBoxLayout:
         self.operator = QLineEdit()
         self.operator.setMinimumWidth(90)
         self.operator.setToolTip("Name of the person who arms; kept in journal and recordings")
@@ -146,19 +147,24 @@ class CampaignControls(QWidget):
             caption.setBuddy(field)
             row.addWidget(caption)
             row.addWidget(field, share)
-        row.addWidget(self.paced)
+        steps = QHBoxLayout()
+        steps.addWidget(self.paced)
+        steps.addStretch(1)
         self.arm = StepButton("1  Arm", "First step: no voltage yet", "F5", self, self._status)
         self.arm.setCheckable(True)
         self.start = StepButton("2  Start", "Second step: play the batch", "F6", self, self._status)
         for step in (self.arm, self.start):
             step.setMinimumSize(_STEP_WIDTH, 36)
-            row.addWidget(step)
+            steps.addWidget(step)
+        rows = QVBoxLayout()
+        rows.addLayout(row)
+        rows.addLayout(steps)
         self.operator.textChanged.connect(self.operator_changed)
         self.operator.textChanged.connect(self.changed)
         self.runs.valueChanged.connect(self.changed)
         self.hours.valueChanged.connect(self.changed)
         self.paced.toggled.connect(self.changed)
-        return row
+        return rows
 
     def _halt_row(self) -> QWidget:
         self.halt = Message()

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from PySide6.QtCore import QTimer, Signal, Slot
-from PySide6.QtGui import QTextCursor
-from PySide6.QtWidgets import QPlainTextEdit, QTabWidget, QWidget
+from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.batch.forecast import Forecast, survey
@@ -53,13 +52,8 @@ class PlanEditor(TomlEditor):
         super().__init__(session, _WORDS, EXAMPLE, parent)
         self.edit.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.form = PlanForm()
-        self.tabs = QTabWidget()
-        column = self.layout()
-        if column is not None:
-            column.replaceWidget(self.edit, self.tabs)
-        self.tabs.addTab(self.form, "Form")
-        self.tabs.addTab(self.edit, "Text")
-        self.form.changed.connect(self._form_changed)
+        self.tabs = self.put_form(self.form)
+        self.form.changed.connect(self.take)
         self.changed.connect(self._show_form)
         self._show_form()
 
@@ -69,13 +63,6 @@ class PlanEditor(TomlEditor):
         self.form.setEnabled(not fixed)
         self.open_button.setEnabled(not fixed)
         self.example_button.setEnabled(not fixed)
-
-    @Slot(str)
-    def _form_changed(self, toml: str) -> None:
-        """Take the text of the form as one step that can be undone."""
-        cursor = QTextCursor(self.edit.document())
-        cursor.select(QTextCursor.SelectionType.Document)
-        cursor.insertText(toml)
 
     @Slot()
     def _show_form(self) -> None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import Signal, Slot
-from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtGui import QFontDatabase, QTextCursor
+from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QTabWidget, QVBoxLayout, QWidget
 
 from dearig.window.documents.file_actions import FileActions
 from dearig.window.kit.widgets import button, label
@@ -101,6 +101,23 @@ class TomlEditor(QWidget):
         self._file = file
         self.edit.setPlainText(toml)
         self._edited()
+
+    @Slot(str)
+    def take(self, toml: str) -> None:
+        """Replace the text by that of a form, as one step that can be undone."""
+        cursor = QTextCursor(self.edit.document())
+        cursor.select(QTextCursor.SelectionType.Document)
+        cursor.insertText(toml)
+
+    def put_form(self, form: QWidget) -> QTabWidget:
+        """Show ``form`` and the text on two tabs; return them."""
+        tabs = QTabWidget()
+        column = self.layout()
+        if column is not None:
+            column.replaceWidget(self.edit, tabs)
+        tabs.addTab(form, "Form")
+        tabs.addTab(self.edit, "Text")
+        return tabs
 
     def close_work(self) -> None:
         """Wait for the thread that reads and writes files."""

@@ -23,7 +23,6 @@ from dearig.report.pages.hold import hold_summary
 from dearig.report.pages.track import limits_table
 from dearig.report.text.numbers import seconds, significant
 from dearig.report.text.tables import Table
-from dearig.units import readable
 from dearig.window.follow.hold_jobs import (
     HoldForecast,
     HoldRequest,
@@ -237,7 +236,7 @@ class HoldPanel(QWidget):
             "and correction while it runs; STOP ends it as any other.",
             limits_table(forecast.margins),
         ]
-        self.words.show_pieces(pieces, tuple(readable(f"{w}.") for w in forecast.warnings))
+        self.words.show_pieces(pieces, tuple(f"{w}." for w in forecast.warnings))
         self._draw()
         self.area.auto_range()
 

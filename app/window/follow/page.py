@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
-import tomli_w
 from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -24,7 +23,6 @@ from PySide6.QtWidgets import (
 
 from dearig.analysis.track_target import WITHIN
 from dearig.analysis.tracking import TrackedRun
-from dearig.config.targetfile import EXAMPLE
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.recording.result_folder import numbered_folder
@@ -34,8 +32,6 @@ from dearig.report.pages.track import (
     track_headline,
 )
 from dearig.report.text.tables import Table
-from dearig.units import readable
-from dearig.window.documents.toml_editor import EditorWords, TomlEditor
 from dearig.window.follow.hold_panel import HoldPanel
 from dearig.window.follow.jobs import (
     FollowRequest,
@@ -47,6 +43,7 @@ from dearig.window.follow.jobs import (
 )
 from dearig.window.follow.model_choice import ModelChoice
 from dearig.window.follow.plots import ErrorPlot, FollowPlots
+from dearig.window.follow.target import TargetEditor
 from dearig.window.jobs.job_controls import JobControls, result_side, splitter
 from dearig.window.jobs.worker import Job, Worker
 from dearig.window.kit.browser import open_in_browser
@@ -60,9 +57,9 @@ from dearig.window.session.page import Page, Pages
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import EditedFile
 
-__all__ = ["FollowPage", "TargetEditor"]
+__all__ = ["FollowPage"]
 
-_LEFT = 330  # px, default width of the left column
+_LEFT = 400  # px, default width of the left column
 _COLUMNS = [520, 340]  # px, of the words and of the error from run to run
 _WITHIN_MAX = 1000.0  # um
 
@@ -303,7 +300,7 @@ class FollowPage(Page):
         notes = () if not tracking.runs else tracking.runs[-1].notes
         self.next_run.show_pieces(
             self._next_texts(followed),
-            tuple(readable(f"{said}.") for said in (*tracking.warnings, *notes)),
+            tuple(f"{said}." for said in (*tracking.warnings, *notes)),
         )
         self.runs.show_table(runs_table(outcome))
         self.errors.show_runs(tracking.runs)
@@ -329,7 +326,7 @@ class FollowPage(Page):
                 "It is within all limits. Every run is armed by itself: click Show on Run, look at "
                 "its plan there, then Arm and Start."
             )
-        pieces += [readable(f"Not reachable: {part.sentence}.") for part in missed]
+        pieces += [f"Not reachable: {part.sentence}." for part in missed]
         if followed.margins:
             pieces.append(limits_table(followed.margins))
         return pieces
@@ -417,7 +414,7 @@ class FollowPage(Page):
         inner.addWidget(self.nearest)
         inner.addWidget(self.job)
         frame = card(inner)
-        frame.setMinimumWidth(280)
+        frame.setMinimumWidth(270)
         return frame
 
     def _make_results(self) -> QWidget:
@@ -458,37 +455,10 @@ class FollowPage(Page):
 
 #: Text of the page before the first voltage.
 _INTRODUCTION = (
-    "Write the displacement that the film shall follow at the left, or open a file. Choose the "
+    "Compose the displacement that the film should follow at the left, or open a file. Choose the "
     "model that computes the voltage, best one that a diagnosis has found.",
     "Compute the voltage shows what the model expects, the margins to all limits, and what the "
     "film cannot follow, before anything is played.",
     "Show on Run shows the next run on the page Run. Every run is armed by itself, and STOP ends "
     "it as any other. After it this page shows its error and the voltage that was learned from it.",
 )
-
-
-_TABLES = (".csv", ".txt", ".dat")
-_WORDS = EditorWords(
-    what="target",
-    caption="&Target",
-    tip="Displacement from the loaded rest state: the segments of a sequence, in mm",
-    open_tip="Read a target, or a table (CSV) of time and displacement",
-    example_tip="Replace the target by one that the rig of the thesis can follow",
-    kinds="Targets (*.toml);;Tables (*.csv *.txt *.dat)",
-)
-
-
-class TargetEditor(TomlEditor):
-    """Text of a target file, from a file, a table or written in place."""
-
-    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(session, _WORDS, EXAMPLE, parent)
-
-    def open_file(self, path: Path) -> None:
-        """Read a target (.toml), or make one of a table (.csv)."""
-        if path.suffix.lower() not in _TABLES:
-            super().open_file(path)
-        elif self.files.confirm_discard():
-            segment = {"kind": "csv", "file": path.name}
-            text = tomli_w.dumps({"name": path.stem, "segment": [segment]})
-            self.restore(text, EditedFile("target", text, None, path.parent))

@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import Qt, Slot
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QHBoxLayout,
     QLabel,
     QProgressBar,
@@ -23,6 +25,7 @@ from dearig.window.kit.widgets import button, label
 __all__ = ["JobControls", "result_side", "splitter"]
 
 _PARTS = 1000  # of the bar of progress
+_HEADLINE = 300  # px that a headline has beside its buttons, at least
 
 
 def splitter(orientation: Qt.Orientation, *parts: QWidget, growing: int | None = None) -> QSplitter:
@@ -44,21 +47,37 @@ def result_side(
     *below: QWidget,
 ) -> QWidget:
     """Make the right side of a page: headline and buttons, messages, results, what is below."""
-    headline.setWordWrap(True)
-    top = QHBoxLayout()
-    top.addWidget(headline, 1)
-    for made in buttons:
-        top.addWidget(made, 0, Qt.AlignmentFlag.AlignTop)
     side = QWidget()
     outer = QVBoxLayout(side)
     outer.setContentsMargins(SPACE, 0, 0, 0)
-    outer.addLayout(top)
+    outer.addWidget(_Head(headline, buttons))
     for message in messages:
         outer.addWidget(message)
     outer.addWidget(results, 1)
     for part in below:
         outer.addWidget(part)
     return side
+
+
+class _Head(QWidget):
+    """Headline, and beside it buttons, or below it where they would leave it too little width."""
+
+    def __init__(self, headline: QLabel, buttons: Sequence[QPushButton]) -> None:
+        super().__init__()
+        headline.setWordWrap(True)
+        self._both = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._both.setContentsMargins(0, 0, 0, 0)
+        self._both.addWidget(headline, 1)
+        self._tools = QHBoxLayout()
+        for made in buttons:
+            self._tools.addWidget(made, 0, Qt.AlignmentFlag.AlignTop)
+        self._both.addLayout(self._tools)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        super().resizeEvent(event)
+        is_narrow = self.width() < self._tools.sizeHint().width() + _HEADLINE
+        direction = QBoxLayout.Direction
+        self._both.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
 
 
 class JobControls(QWidget):

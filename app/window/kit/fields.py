@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from dearig.config.rigform import SECTIONS
 from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.sequencefile import HEAD_FIELDS
+from dearig.config.targetfile import millimetre_key
 from dearig.config.toml_input import allowed
 from dearig.units import name_and_unit
 from dearig.window.kit.number_text import NumberTextError, read_number, read_numbers
@@ -144,6 +145,7 @@ def _keys() -> re.Pattern[str]:
     """Return a pattern of the keys of sequences and rig files that are no words by themselves."""
     tables = [*SECTIONS.values(), *SEGMENT_KINDS.values()]
     keys = {*HEAD_FIELDS, *(key for table in tables for key in table.model_fields)}
+    keys |= set(map(millimetre_key, keys))  # of targets
     named = "|".join(sorted((key for key in keys if "_" in key), key=len, reverse=True))
     return re.compile(rf"\b(?:({'|'.join(SECTIONS)})\.)?({named})\b(?!\.)")
 

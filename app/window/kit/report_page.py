@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from dearig.report.text.tables import Table
+from dearig.units import readable
 from dearig.window.kit.report_table import ReportTable
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import label
@@ -61,7 +62,7 @@ class ReportPage(QScrollArea):
 
 
 def _paragraph(text: str, role: str) -> QLabel:
-    made = label(text, role)
+    made = label(readable(text), role)
     made.setWordWrap(True)
     made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     return made

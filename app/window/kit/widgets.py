@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dearig.units import readable
 from dearig.window.kit.theme import SPACE, digits
 
 __all__ = [
@@ -131,7 +132,7 @@ class Message(QLabel):
     def show_text(self, text: str, role: str = "bad") -> None:
         """Show ``text`` in the colour of ``role``; an empty text hides the message."""
         set_role(self, role)
-        self.setText(text)
+        self.setText(readable(text))
         self.setVisible(bool(text))
 
 

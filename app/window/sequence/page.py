@@ -11,12 +11,12 @@ from PySide6.QtWidgets import QHBoxLayout, QMenu, QSplitter, QVBoxLayout, QWidge
 from dearig.config.presets import PRESETS
 from dearig.errors import InputError
 from dearig.window.documents.dialogs import choose_file
+from dearig.window.documents.draft import Draft, relative_csv
 from dearig.window.documents.file_actions import FileActions
+from dearig.window.documents.segment_editor import SequenceEditor
 from dearig.window.kit.fields import in_words
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import button, menu_button
-from dearig.window.sequence.draft import Draft, relative_csv
-from dearig.window.sequence.editor import SequenceEditor
 from dearig.window.sequence.preview_panel import PreviewPanel
 from dearig.window.session.layout_state import remember
 from dearig.window.session.page import Page

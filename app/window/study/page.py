@@ -41,6 +41,7 @@ from dearig.window.session.layout_state import remember
 from dearig.window.session.page import Page
 from dearig.window.session.state import Session
 from dearig.window.study.before_after_plot import BeforeAfterPlot
+from dearig.window.study.known_parameters import KnownParameters
 from dearig.window.study.residual_plots import ResidualPlots
 from dearig.window.study.training_table import TrainingPanel, TrainingTable
 from dearig.window.study.trends_panel import TrendsPanel
@@ -129,6 +130,7 @@ class StudyPage(Page):
         form.addRow("&Branches", self.branches)
         form.addRow("S&prings", self.spring)
         form.addRow("D&rive", self.drive)
+        self.known = KnownParameters(self._session)
 
         self.start = button("&Start", "Start the fit or the diagnosis, in the background", True)
         self.start.clicked.connect(self.begin)
@@ -148,6 +150,7 @@ class StudyPage(Page):
         inner.addWidget(self.diagnose)
         inner.addWidget(self.identify)
         inner.addLayout(form)
+        inner.addWidget(self.known)
         inner.addWidget(self.job)
         frame = card(inner)
         frame.setMinimumWidth(frame.minimumSizeHint().width())
@@ -218,7 +221,7 @@ class StudyPage(Page):
     # job
 
     def task(self) -> StudyRequest:
-        """Return the task of the form."""
+        """Return the task of the form. Raises ``InputError`` for a faulty parameter file."""
         return StudyRequest(
             diagnose=self.diagnose.isChecked(),
             train=self.recordings.train,
@@ -228,6 +231,7 @@ class StudyPage(Page):
             drive=self.drive.currentData(),
             limits=self._session.rig_file,
             ended_early=self.ended_early.currentData(),
+            parameters=self.known.stated(),
         )
 
     @Slot()
@@ -240,7 +244,11 @@ class StudyPage(Page):
         if self.job.job is not None:
             return
         self.message.show_text("")
-        task = self.task()
+        try:
+            task = self.task()
+        except InputError as error:
+            self.message.show_text(str(error))
+            return
         self._label_previous()
         job = self._worker.submit(make_study, task, self._session.folder, whole=task.diagnose)
         job.finished.connect(self._finished)

@@ -205,7 +205,7 @@ def test_a_segment_kind_of_another_distribution_has_a_form(tmp_path: Path) -> No
         from PySide6.QtWidgets import QApplication, QLabel
         application = QApplication([])
         from dearig.config.sequencefile import parse_sequence
-        from dearig.window.sequence.editor import SequenceEditor
+        from dearig.window.documents.segment_editor import SequenceEditor
         editor = SequenceEditor('name = "new"\\n')
         editor.fill(0)
         (added,) = [a for a in editor.add_button.menu().actions() if a.text() == "sawtooth"]

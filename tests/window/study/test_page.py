@@ -272,3 +272,29 @@ def test_the_room_of_the_parts_is_kept_until_it_is_reset(session, keep, qtbot):
     assert second.split.sizes() == moved != default
     second.reset_layout()
     assert second.split.sizes() == default
+
+
+def test_what_is_known_of_parameters_goes_into_the_fit(
+    session: Session, keep: Keep, qtbot: QtBot, tmp_path: Path
+) -> None:
+    page = open_page_without_recordings(session, keep)
+    assert page.task().parameters == {}
+    file = tmp_path / "known.toml"
+    file.write_text("[mu_1_kPa]\nmean = 20.0\nsd = 2.0\n[T_1_s]\nfixed = 0.5\n", "utf-8")
+    page.known.open_file(file)
+    assert page.task().parameters == {
+        "mu_1_kPa": {"mean": 20.0, "sd": 2.0},
+        "T_1_s": {"fixed": 0.5},
+    }
+    assert page.known.shown.full_text == "mu_1_kPa: mean 20, sd 2; T_1_s: fixed 0.5"
+    faulty = tmp_path / "faulty.toml"
+    faulty.write_text("[mu_1_kPa]\nmiddle = 20.0\n", "utf-8")
+    page.known.open_file(faulty)
+    assert "middle is not a key" in page.known.trouble.text()
+    assert page.known.path == file
+    file.write_text("[mu_1_kPa]\nmean = 'much'\n", "utf-8")  # since it was chosen
+    page.begin()
+    assert "mu_1_kPa.mean" in page.message.text()
+    assert page.job.job is None
+    click(qtbot, page.known.clear_button)
+    assert page.task().parameters == {}

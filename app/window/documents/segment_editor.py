@@ -1,8 +1,7 @@
-"""Editor of a sequence: its name and rests, the table of segments, and one segment's fields."""
+"""Editor of a sequence or a target: its name and rests, its segments, and the fields of one."""
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
@@ -23,13 +22,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.sequencefile import HEAD_FIELDS, SequenceFault
+from dearig.window.documents.draft import Draft
+from dearig.window.documents.segment_forms import SegmentForms, sequence_forms
 from dearig.window.kit.fields import (
-    FormField,
     Typed,
     form_field,
-    form_fields,
     in_words,
     read_back,
     read_typed,
@@ -38,7 +36,6 @@ from dearig.window.kit.fields import (
 from dearig.window.kit.form import Form
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, label, menu_button, plain_tip, set_wrong
-from dearig.window.sequence.draft import Draft
 from dearig.window.session.text_file import EditedFile
 
 __all__ = ["SequenceEditor"]
@@ -62,9 +59,17 @@ class SequenceEditor(QWidget):
     file_wanted = Signal()
 
     def __init__(
-        self, toml: str, file: EditedFile | None = None, parent: QWidget | None = None
+        self,
+        toml: str,
+        file: EditedFile | None = None,
+        parent: QWidget | None = None,
+        *,
+        forms: SegmentForms | None = None,
+        explain: bool = True,
     ) -> None:
         super().__init__(parent)
+        self._forms = forms or sequence_forms()
+        self._explain = explain  # beside the fields, not only in their tooltips
         self.draft = Draft(toml, file)
         self.form: Form | None = None
         self._form_of: tuple[int, str] | None = None  # row and kind
@@ -103,7 +108,8 @@ class SequenceEditor(QWidget):
     def add(self, kind: str, **given: Any) -> None:
         """Add a segment of ``kind`` after the chosen one, with ``given`` in place of defaults."""
         row = self.table.currentRow() + 1 if self.draft.segments else 0
-        self._change(lambda: self.draft.add(kind, row, **given), row)
+        keys = {**self._forms.examples[kind], **given}
+        self._change(lambda: self.draft.add(row, kind, keys), row)
 
     @Slot()
     def duplicate(self) -> None:
@@ -265,7 +271,7 @@ class SequenceEditor(QWidget):
 
     def _show_form(self, row: int) -> None:
         segments = self.draft.segments
-        if not 0 <= row < len(segments) or segments[row].get("kind") not in SEGMENT_KINDS:
+        if not 0 <= row < len(segments) or segments[row].get("kind") not in self._forms.fields:
             self._put_form(None, None)
             return
         table = segments[row]
@@ -273,7 +279,7 @@ class SequenceEditor(QWidget):
         if self._form_of == (row, kind) and self.form is not None:
             self.form.show_values(table)
             return
-        form = Form(_fields(kind), table, explain=True)
+        form = Form(self._forms.fields[kind], table, explain=self._explain)
         form.changed.connect(self.set_value)
         self._put_form(form, (row, kind))
 
@@ -286,7 +292,7 @@ class SequenceEditor(QWidget):
         kind = str(table.get("kind", "?"))
         settings = ", ".join(
             f"{field.label} {shown_value(table[field.key])} {field.unit}".rstrip()
-            for field in (_fields(kind) if kind in SEGMENT_KINDS else ())
+            for field in self._forms.fields.get(kind, ())
             if field.key in table and not (field.key == "repeats" and table[field.key] == 1)
         )
         kept = self.table.item(row, _DURATION)
@@ -305,10 +311,11 @@ class SequenceEditor(QWidget):
     def _head_row(self) -> QHBoxLayout:
         row = QHBoxLayout()
         self.heads: dict[str, QLineEdit] = {}
+        what, rest = self._forms.what, self._forms.rest
         for key, words, tip, default, share in (
-            ("name", "&Name", "Name of the sequence and of its recordings", "", 4),
-            ("lead_in_s", "&Lead-in (s)", "Rest at 0 V before the first segment", "2", 1),
-            ("tail_s", "&Tail (s)", "Rest at 0 V after the last segment", "1", 1),
+            ("name", "&Name", f"Name of the {what} and of its recordings", "", 4),
+            ("lead_in_s", "&Lead-in (s)", f"Rest at {rest} before the first segment", "2", 1),
+            ("tail_s", "&Tail (s)", f"Rest at {rest} after the last segment", "1", 1),
         ):
             field = QLineEdit()
             field.setPlaceholderText(default)
@@ -344,9 +351,9 @@ class SequenceEditor(QWidget):
         row = QHBoxLayout()
         kinds = QMenu(self)
         kinds.setToolTipsVisible(True)
-        for kind, table in SEGMENT_KINDS.items():
+        for kind, tip in self._forms.tips.items():
             action = kinds.addAction(kind.replace("_", " "))
-            action.setToolTip((inspect.getdoc(table) or "").partition("\n")[0])
+            action.setToolTip(tip)
             action.triggered.connect(lambda _=False, kind=kind: self._add_from_menu(kind))
         self.add_button = menu_button("+ A&dd", "Add a segment after the chosen one", kinds)
         row.addWidget(self.add_button)
@@ -371,9 +378,3 @@ class SequenceEditor(QWidget):
             self.file_wanted.emit()
         else:
             self.add(kind)
-
-
-def _fields(kind: str) -> list[FormField]:
-    """Return the fields of a segment kind, the number of repeats last."""
-    fields = list(form_fields(SEGMENT_KINDS[kind], ("kind",)))
-    return sorted(fields, key=lambda field: field.key == "repeats")

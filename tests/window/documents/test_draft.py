@@ -11,8 +11,8 @@ from dearig.config.rigfile import RigFile
 from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError
+from dearig.window.documents.draft import Draft, relative_csv
 from dearig.window.kit.fields import form_fields, read_back, read_typed, shown_value
-from dearig.window.sequence.draft import Draft, relative_csv
 from dearig.window.sequence.planner import make_preview
 
 
@@ -29,11 +29,11 @@ def test_every_preset_survives_being_edited(name: str) -> None:
 @pytest.mark.parametrize("kind", [k for k in SEGMENT_KINDS if k != "csv"])
 def test_a_new_segment_can_be_played_as_it_stands(kind: str) -> None:
     draft = Draft('name = "new"\n')
-    draft.add("ramp", 0, to_kV=2.0)
-    draft.add(kind, 1)
+    draft.add(0, "ramp", {"to_kV": 2.0, "duration_s": 1.0})
+    draft.add(1, kind, SEGMENT_KINDS[kind].example)
     if kind not in ("ramp", "hold", "chirp", "multisine", "steps"):
         draft.remove(0)  # those start from 0 V
-    draft.add("ramp", len(draft.segments), to_kV=0.0)
+    draft.add(len(draft.segments), "ramp", {"to_kV": 0.0, "duration_s": 1.0})
     preview = make_preview(draft.toml, Path(), RigFile())
     assert preview.playable, preview.sentence or preview.plan
 
@@ -47,7 +47,7 @@ def test_every_change_can_be_taken_back_and_made_again() -> None:
         lambda: draft.remove(0),
         lambda: draft.set_value(0, "to_kV", 3.0),
         lambda: draft.set_head("lead_in_s", 5.0),
-        lambda: draft.add("hold", 2),
+        lambda: draft.add(2, "hold", {"duration_s": 1.0}),
         lambda: draft.replace(PRESETS["thesis"]),
     ):
         change()

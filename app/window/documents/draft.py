@@ -1,14 +1,13 @@
-"""Sequence that is being edited: its tables, with undo and redo."""
+"""Sequence or target that is being edited: its tables, with undo and redo."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.toml_edit import SegmentTexts, split_segments, written_anew
 from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError
@@ -111,9 +110,9 @@ class Draft:
                 segments, lambda text: text.with_value(row, key, value), (row, key)
             )
 
-    def add(self, kind: str, row: int, **given: Any) -> None:
-        """Insert a new segment of ``kind`` at ``row``; ``given`` replaces default values."""
-        table = {"kind": kind, **copy.deepcopy(dict(SEGMENT_KINDS[kind].example)), **given}
+    def add(self, row: int, kind: str, keys: Mapping[str, Any]) -> None:
+        """Insert a new segment of ``kind`` with ``keys`` at ``row``."""
+        table = {"kind": kind, **copy.deepcopy(dict(keys))}
         self._change_segments(
             [*self.segments[:row], table, *self.segments[row:]],
             lambda text: text.with_segment(row, table),
