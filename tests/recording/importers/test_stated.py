@@ -222,6 +222,10 @@ def test_a_strain_that_a_workbook_shows_in_per_cent(tmp_path: Path) -> None:
         cell.number_format = "0.0%"
     book.save(tmp_path / "in.xlsx")
     np.testing.assert_allclose(taken(tmp_path / "in.xlsx").stretch, 1.0 + 0.5 * TIME, rtol=1e-12)
+    book.active["B9"].number_format = "General"
+    book.save(tmp_path / "in.xlsx")
+    with refused("'Strain.*give them one format"):
+        taken(tmp_path / "in.xlsx")
 
 
 @pytest.mark.parametrize(
