@@ -39,6 +39,7 @@ from dearig.recording.importers.formats.text_layout import (
     HEAD_CHARACTERS,
     TextColumn,
     TextLayout,
+    is_line_of_names,
     layout_of,
 )
 from dearig.recording.importers.formats.text_lines import cells_of, encoding_of, holds_data
@@ -462,6 +463,12 @@ usecols=sorted(places), dtype=str, na_filter=False,
             fault, values, column = self._row(content, self._wanted)
             if not fault:
                 rows.append(values)
+            elif is_line_of_names(content, self.layout):
+                raise InputError(
+                    f"{self.path}, line {number}: here are names of columns again, others than "
+                    f"those above: the rows behind them may be of another order and other units; "
+                    f"make two files of it"
+                )
             elif self._leaves_out and column not in self.optional:
                 self.skipped.append((before + len(rows), f"line {number}"))
                 lost = len(self.skipped)
