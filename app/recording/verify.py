@@ -66,15 +66,16 @@ def verify(path: str | Path) -> Verification:
     if a run that still records to it leaves it in a state that cannot be judged.
     """
     path = Path(path)
-    if reason := why_no_file(path):
-        raise InputError(f"{path} {reason}")
     for _ in range(LOOKS):
+        if reason := why_no_file(path):  # also one that vanished while it was read
+            raise InputError(f"{path} {reason}")
         before = file_state(path)
         found = _look(path)
-        if found.sound or file_state(path) == before:
-            break
-    if not found.sound:
+        if found.sound:
+            return found
         refuse_in_use(path)
+        if file_state(path) == before:
+            break
     return found
 
 

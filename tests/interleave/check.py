@@ -47,8 +47,8 @@ def _outputs(folder: Path, ended: list[Ended]) -> Iterator[str]:
         who = f"{one.command.kind} {one.command.name}"
         killed = one.code == -9
         if one.code == FAILED and any(words in one.said for words in BEFORE_SAMPLES):
-            # true of a run that was killed before it had samples
-            if not _killed_run(ended, folder / one.command.name):
+            # true of a run that was killed before it had samples, or of one that has only begun
+            if not _killed_run(ended, folder / one.command.name) and not _beginning(ended, one):
                 yield f"{who}: {one.said[-300:]}"
             continue
         if one.code not in ALLOWED and not killed:
@@ -117,6 +117,17 @@ def _killed_run(ended: list[Ended], path: Path) -> bool:
     name = path.name.removesuffix(".old")
     return any(
         one.code == -9 and one.command.name == name and one.command.kind in ("record", "force")
+        for one in ended
+    )
+
+
+def _beginning(ended: list[Ended], during: Ended) -> bool:
+    """Return whether a command that makes the file of ``during`` went on at the same time."""
+    return any(
+        one.command.kind in ("record", *REPLACES)
+        and one.command.name == during.command.name
+        and one.began < during.ended
+        and one.ended > during.began
         for one in ended
     )
 

@@ -6,13 +6,15 @@ import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import h5py
 import pytest
 
 from dearig.drivers.rig import Block
-from dearig.recording import RunMetadata, save_recording
+from dearig.errors import InputError
+from dearig.recording import RunMetadata, open_recording, save_recording
 from dearig.recording.content.text import fixed
 from dearig.recording.verify import verify
 from tests.recording.reading.test_reader import attribute, film_values, removed, value
@@ -195,3 +197,17 @@ def test_the_command_says_it_and_ends_with_4(tmp_path: Path, run: Path) -> None:
     assert "displacement" in bad.json["faults"][0]
     assert "WRONG: the counts of displacement" in dearig("info", path, "--verify").out
     assert dearig("info", tmp_path / "none.h5", "--verify").code == 2
+
+
+def test_a_file_that_vanishes_while_it_is_read_is_not_there_and_not_wrong(
+    tmp_path: Path, run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = Path(shutil.copy(run, tmp_path / "run.h5"))
+
+    def vanishing(path: Path) -> object:
+        path.unlink()
+        return open_recording(path)
+
+    monkeypatch.setattr(import_module("dearig.recording.verify"), "open_recording", vanishing)
+    with pytest.raises(InputError, match=r"run\.h5 is not there"):
+        verify(path)

@@ -121,8 +121,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
             patched.end = after
             if not after:
                 raise InputError(
-                    f"{path} is empty: its run or its program ended before it wrote anything; "
-                    f"delete it, or record again",
+                    f"{path} is empty: its run or its program ended before it wrote anything, or "
+                    f"has only begun; delete it, or record again",
                     option="force",
                 )
             flags = flags_of(patched.read(SIZE) or b"")
