@@ -85,12 +85,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=240000, help="seed [240000]")
     parser.add_argument("--each", type=int, default=2, help="rigs of each family [2]")
+    parser.add_argument("--generator", choices=GENERATORS, help="one of the generators [both]")
     given = parser.parse_args()
     right: dict[str, list[bool]] = {"with": [], "without": []}
     seconds: dict[str, float] = dict.fromkeys(right, 0.0)
     print("| rig | hidden | with the channels | without | time, with over without |")
     print("|---|---|---|---|---|")
-    for generator in GENERATORS:
+    for generator in [given.generator] if given.generator else GENERATORS:
         for case in hidden(given.first, given.each, generator):
             family = case.families[0] if case.families else "clean"
             with tempfile.TemporaryDirectory() as name:
