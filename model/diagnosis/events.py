@@ -68,9 +68,10 @@ def own_of(
     better than a single lead-in.
 
     They are accepted only if the remaining error is noise, or a fiftieth of what they explain: an
-    event imitates part of any law that the model lacks. What explains as much from the start on is
-    a difference of the whole recording and no event. An effect acts at one moment of a recording,
-    so of two events of one kind the larger is found.
+    event imitates part of any law that the model lacks. What explains as much from the start on, or
+    with other moduli and relaxation times, is a difference of the whole recording and no event: a
+    fit to little data predicts a longer recording with a slow error. An effect acts at one moment
+    of a recording, so of two events of one kind the larger is found.
     """
     response = model.simulate(record.drive, record.lag)
     if response.ok:
@@ -154,9 +155,9 @@ def _with_events(fitter: Fitter, judge: Judge, best: Fit) -> Fit:
         top = min(fits, key=judge.criterion, default=best)
         if judge.gain(best, top) < odds:
             break
-        whole = _from_the_start(fitter, top, held)
-        judge.see([whole])
-        if judge.gain(whole, top) < odds:
+        whole = [_from_the_start(fitter, top, held), _of_other_springs(best, held)]
+        judge.see(whole)
+        if any(judge.gain(other, top) < odds for other in whole):
             break  # the whole recording differs from the model: this is no event
         best = top
     return best
@@ -170,6 +171,14 @@ def _from_the_start(fitter: Fitter, fit: Fit, held: int) -> Fit:
     fixed = np.arange(layout.size) < held
     fixed[-1] = True  # the moment
     return _fitted(fit.problem, values, fixed)
+
+
+def _of_other_springs(fit: Fit, held: int) -> Fit:
+    """Return ``fit`` with moduli and relaxation times free, and the events that it has."""
+    layout = fit.problem.layout
+    events = np.arange(held, layout.size)
+    free = np.concatenate([layout.column("mu"), layout.column("T"), events])
+    return _fitted(fit.problem, layout.values(fit.x), ~np.isin(np.arange(layout.size), free))
 
 
 def _with_event(fitter: Fitter, best: Fit, name: str, held: int) -> Fit:

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from dearig.model.diagnosis.events import drifts_at_rest, own_of
+from dearig.model.film.material import TABLE_3
+from dearig.model.fitting import identify
 from dearig.model.readings.noise import noise_at_rest
 from dearig.model.readings.records import ActuatorRecord, counted
 from dearig.model.simulation.actuator import Drive
+from dearig.model.simulation.excitation import Sequence
 from tests.tools.engine import NOISE, PLAIN, effect, pink_noise, record_of, thesis_drive
 
 KINDS = {
@@ -131,3 +134,14 @@ def test_a_drift_of_the_reading_is_there_before_the_voltage() -> None:
     assert not drifts_at_rest([replace(record, displacement=late)], PLAIN)
     # without readings at rest nothing speaks against a drift
     assert drifts_at_rest([replace(record, displacement=late, lead_in=0)], PLAIN)
+
+
+@pytest.mark.parametrize("seed", [2, 8])
+def test_what_other_springs_explain_is_no_event(seed: int) -> None:
+    """A fit to 4 s under voltage predicts half a minute with a slow error."""
+    thesis = replace(PLAIN, network=TABLE_3)
+    lobes = Sequence.thesis(amplitudes=(6e3, 7e3), frequencies=(0.4, 1.0), periods=1)
+    little = record_of(thesis, Drive(*lobes.sample(100.0), hold=True), seed=seed)
+    fitted = identify([little], thesis, intervals=False, workers=1).model
+    record = record_of(thesis, thesis_drive(periods=2), seed=seed + 50)
+    assert own_of(record, fitted, may_drift=False) is None
