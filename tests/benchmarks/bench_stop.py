@@ -164,7 +164,7 @@ def measure(
     until(lambda: window.session.preview is not None)
     if ready:
         # the comparisons with the model go on for minutes, and stop during a run
-        until(lambda: window.idle_pages.done and len(window.library.summaries) == MANY)
+        until(lambda: window.idle_pages.done and len(window.library.summaries) >= MANY)
     run_event_loop(1.0)
     until(lambda: run.arm_button.isEnabled() and run.arm_button.answers)
     run.runner.arm(True)
