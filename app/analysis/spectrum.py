@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import welch
 
 __all__ = ["amplitude_density"]
 
@@ -21,6 +20,8 @@ def amplitude_density(values: np.ndarray, rate: float) -> tuple[np.ndarray, np.n
     """
     if values.size < _LEAST or not np.isfinite(values).all():
         return np.empty(0), np.empty(0)
+    from scipy.signal import welch  # takes a second to import
+
     # about _SEGMENTS segments of a power of two, which is fast
     size = max(_LEAST, 2 ** int(np.log2(2.0 * values.size / (_SEGMENTS + 1))))
     frequency, power = welch(values, fs=rate, window="hann", nperseg=min(size, values.size))

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import f as f_distribution
-from scipy.stats import t as t_distribution
+from scipy.special import fdtrc, stdtr, stdtrit
 
 from dearig.extras import import_extra
 
@@ -73,7 +72,7 @@ class LinearFit:
 
     def quantile(self, i: int, confidence: float = 0.95) -> float:
         """Return the standard errors from slope ``i`` to the ends of its interval (Student's t)."""
-        return float(t_distribution.ppf(0.5 + 0.5 * confidence, self.degrees[i]))
+        return float(stdtrit(self.degrees[i], 0.5 + 0.5 * confidence))
 
     def interval(self, i: int, confidence: float = 0.95) -> tuple[float, float]:
         """Return the interval of slope ``i`` that holds the truth with this ``confidence``."""
@@ -210,7 +209,7 @@ def _made(
         slopes=solution[1:],
         errors=errors,
         degrees=degrees,
-        p_values=2.0 * t_distribution.sf(ratios, degrees),
+        p_values=2.0 * stdtr(degrees, -ratios),
         covariance=covariance,
         centre=centre,
         film_intercepts=intercepts,
@@ -339,7 +338,7 @@ def slopes_differ(sample: Sample, variances: np.ndarray, i: int) -> float | None
     if degrees < 1 or full <= 0.0 or rank <= fewer:
         return None
     ratio = (common - full) / (rank - fewer) / (full / degrees)
-    return float(f_distribution.sf(ratio, rank - fewer, degrees))
+    return float(fdtrc(rank - fewer, degrees, ratio))
 
 
 def _scaled(sample: Sample, variances: np.ndarray) -> np.ndarray:
@@ -399,7 +398,7 @@ def with_extra(
     safe = np.where(known, squares, 1.0)
     gains = np.where(known, (added.T @ left) ** 2 / safe, 0.0)
     t = np.sqrt(gains / np.maximum(float(left @ left) - gains, 1e-300) * degrees)
-    return t, 2.0 * t_distribution.sf(t, degrees)
+    return t, 2.0 * stdtr(degrees, -t)
 
 
 def _orthonormal(x: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from dearig.analysis.cores import for_simulations
 from dearig.batch.film_effects import DIFFER, Explained, explain
@@ -44,7 +44,7 @@ _ERRORS = ("rms_um", "rms_kPa", "nrmse_pct", "peak_displacement_mm")
 _SIGNIFICANT = 0.05
 #: Of a single interval, and of all simultaneous ones together.
 _CONFIDENCE = 1.0 - _SIGNIFICANT
-_QUANTILE_95 = float(norm.ppf(0.975))  # an interval of 95 % leaves out 2.5 % on either side
+_QUANTILE_95 = float(ndtri(0.975))  # an interval of 95 % leaves out 2.5 % on either side
 
 
 @dataclass(frozen=True)

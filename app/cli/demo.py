@@ -29,8 +29,9 @@ from dearig.report.pages.html import write_demo_report
 
 __all__ = ["HIDDEN", "DemoResult", "run_demo"]
 
-#: A simulated rig with a hidden effect, which the diagnosis is not told.
-HIDDEN = "sim:8"
+#: A simulated rig with a hidden effect, which the diagnosis is not told: a leakage that the
+#: displacement alone takes for a fault of the amplifier. Monitor and current tell them apart.
+HIDDEN = "sim:12"
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.stats.qmc import Sobol
 
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import Effect, Parameter
@@ -101,6 +100,8 @@ def shape_points(
         return [()]
     points = list(product(*(_starts(p, extent, settings.moments) for p in shapes)))
     if not any(p.relative_to == "duration" for p in shapes):
+        from scipy.stats.qmc import Sobol  # takes a second to import
+
         spread = Sobol(len(shapes), scramble=False).random(settings.shapes)[1:]
         points += [
             tuple(_between(p, extent, u) for p, u in zip(shapes, row, strict=True))

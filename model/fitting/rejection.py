@@ -6,9 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import kolmogorov
-from scipy.stats import chi2, norm
-from scipy.stats import f as f_distribution
+from scipy.special import chdtrc, fdtrc, kolmogorov, ndtr
 
 from dearig.model.fitting.intervals import (
     correlation_end,
@@ -81,8 +79,8 @@ def noise_test(
     variance = float(np.mean(still**2))
     kurtosis = max(float(np.mean(still**4)) / variance**2, 1.0)
     apart = max(correlation_time(still), 1.0) * max(kurtosis - 1.0, 2.0) / 2.0
-    size = f_distribution.sf(
-        float(np.mean(left**2)) / variance, left.size / apart, max(still.size / apart - 1.0, 1.0)
+    size = fdtrc(
+        left.size / apart, max(still.size / apart - 1.0, 1.0), float(np.mean(left**2)) / variance
     )
     white = not averaged and is_flat(still)
     away, lines = spectrum_distance(left, None if white else still)
@@ -120,7 +118,7 @@ def _ljung_box(residual: np.ndarray) -> float:
         return 1.0
     r = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / total
     statistic = n * (n + 2.0) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
-    return float(chi2.sf(statistic, lags))
+    return float(chdtrc(lags, statistic))
 
 
 def _runs(residual: np.ndarray) -> float:
@@ -134,4 +132,4 @@ def _runs(residual: np.ndarray) -> float:
     runs = 1 + int(np.count_nonzero(up[1:] != up[:-1]))
     mean = 1.0 + 2.0 * a * b / (a + b)
     variance = (mean - 1.0) * (mean - 2.0) / (a + b - 1.0)
-    return float(norm.cdf((runs - mean) / math.sqrt(variance)))
+    return float(ndtr((runs - mean) / math.sqrt(variance)))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import savgol_filter
 
 __all__ = ["reading_noise", "smoothed"]
 
@@ -37,6 +36,8 @@ def reading_noise(voltage: np.ndarray) -> float:
 
 def smoothed(voltage: np.ndarray, noise: float) -> np.ndarray:
     """Return ``voltage`` (N,) V without the ``noise`` V of its readings; edges are kept."""
+    from scipy.signal import savgol_filter  # takes a second to import; few recordings need it
+
     out = voltage.copy()
     open_ = np.ones(voltage.size, dtype=bool)
     for window in _WINDOWS:

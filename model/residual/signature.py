@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.signal import welch
 
 from dearig.model.fitting.intervals import correlation_time, unevenness
 from dearig.model.fitting.rejection import noise_test
@@ -119,6 +118,8 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
         _dependence(n, u, q[good], used, up[good], moving[good], test.apart)
         for n, u, q in quantities
     )
+    from scipy.signal import welch  # takes a second to import
+
     frequency, density = welch(
         residual, 1.0 / step, nperseg=min(max(time.size // 6, 64), 4096, time.size)
     )

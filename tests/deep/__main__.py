@@ -1,7 +1,7 @@
 """Run the deep tests: ``python -m tests.deep`` all of them, ``--today`` the share of this day.
 
-The share of a day is every seventh test, so that a week runs them all; ``--day 2026-11-28`` runs
-that of another day, ``--seed N`` a seventh drawn by a number. Other arguments go to pytest.
+The share of a day is every 28th test, so that four weeks run them all; ``--day 2026-11-28`` runs
+that of another day, ``--seed N`` so large a share drawn by a number. Other arguments go to pytest.
 """
 
 from __future__ import annotations
@@ -16,6 +16,14 @@ from pathlib import Path
 from tests.deep.share import DAYS, VARIABLE
 
 ROOT = Path(__file__).parents[2]
+
+
+def files() -> list[str]:
+    """Return the files of tests that have deep ones: the others need not be read."""
+    found = (ROOT / "tests").rglob("test_*.py")
+    return sorted(
+        str(path.relative_to(ROOT)) for path in found if "deep" in path.read_text(encoding="utf-8")
+    )
 
 
 def main() -> int:
@@ -43,7 +51,7 @@ def main() -> int:
         "loadfile",
         "-m",
         "deep or more_examples",
-        *others,
+        *(others or files()),
     ]
     # two processes have two cores: threads of linear algebra would wait for each other
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", VARIABLE: share}

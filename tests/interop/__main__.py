@@ -1,8 +1,8 @@
 """Make files with the real programs, import each, and print what comes in.
 
 Run as ``python -m tests.interop [NAME ...]``. Each program is installed in an environment of its
-own, which is removed afterwards; Octave is used where it is installed. Every printed command is run
-as it is printed: what it imports has to be right too.
+own, which is removed afterwards; Octave and sigrok-cli are used where they are installed. Every
+printed command is run as it is printed: what it imports has to be right too.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ROWS = 1200
 TIME = np.round(np.arange(ROWS) * 0.005, 6)
 KILOVOLTS = np.where(TIME < 2.0, 0.0, 4.0 * np.sin(np.pi * (TIME - 2.0) / 4.0) ** 2)
 RUN = {"time_s": TIME, "voltage_kV": KILOVOLTS, "displacement_mm": 0.1 * KILOVOLTS**2}
-_MADE = ("run.npz", "run.txt", "script")
+_MADE = ("run.npz", "run.txt", "run.csv", "script")
 
 
 def main() -> None:
@@ -42,6 +42,10 @@ def main() -> None:
             folder = Path(made)
             np.savez(folder / "run.npz", **RUN)
             (folder / "run.txt").write_text(octave_text(RUN), "utf-8")
+            np.savetxt(
+                folder / "run.csv", np.column_stack([*RUN.values()]), "%.17g", ",",
+                header=",".join(RUN), comments="",
+            )  # fmt: skip
             version = write_files(program, folder)
             files = [p for p in sorted(folder.iterdir()) if p.is_file() and p.name not in _MADE]
             if not files:
@@ -57,11 +61,11 @@ def write_files(program: Program, folder: Path) -> str:
     """Let ``program`` write its files into ``folder``; return its version, or why there is none."""
     (folder / "script").write_text(program.script, "utf-8")
     if program.command:
-        if shutil.which(program.command[0]) is None:
+        tool = program.tool or program.command[0]
+        if shutil.which(tool) is None:
             return "not installed"
         subprocess.run([*program.command, "script"], cwd=folder, check=False, capture_output=True)
-        told = subprocess.run([*program.command, "--version"], capture_output=True, text=True,
-                              check=False)  # fmt: skip
+        told = subprocess.run([tool, "--version"], capture_output=True, text=True, check=False)
         return next(iter(re.findall(r"\d+\.\d+[.\d]*", told.stdout)), "")
     with tempfile.TemporaryDirectory() as made:
         venv.create(made, with_pip=True)

@@ -16,13 +16,15 @@ class Program:
     """A program that writes measured data.
 
     ``packages`` are pinned requirements, the first one is the program; ``script`` writes the files.
-    A program that is no Python package has the ``command`` that takes the script.
+    A program that is no Python package has the ``command`` that takes the script, and is called
+    ``tool`` where the script calls it.
     """
 
     name: str
     script: str
     packages: tuple[str, ...] = ()
     command: tuple[str, ...] = ()
+    tool: str = ""
 
 
 _PANDAS = """
@@ -207,12 +209,33 @@ save("struct.mat", "data");
 save("-hdf5", "struct.h5", "data");
 """
 
+_SIGROK = """
+read="-i run.csv -I csv:header=true:samplerate=200:column_formats=t,2a"
+sigrok-cli $read -O csv -o plain.csv
+sigrok-cli $read -O csv:time=true:label=channel:dedup=false -o named.csv
+sigrok-cli $read -O srzip -o session.sr
+"""
+_PYTABLES = """
+import numpy as np, tables
+run = dict(np.load("run.npz"))
+units = {n: n.partition("_")[2] for n in run}
+with tables.open_file("arrays.h5", "w") as file:
+    for name, values in run.items():
+        array = file.create_carray("/", name.partition("_")[0], obj=values)
+        array.attrs.unit = units[name]
+with tables.open_file("table.h5", "w") as file:
+    rows = np.rec.fromarrays(list(run.values()), names=list(run))
+    table = file.create_table("/rig", "run", obj=rows, createparents=True)
+    table.cols.time_s.create_csindex()
+"""
+
 PROGRAMS = (
     Program("pandas", _PANDAS, ("pandas==3.1.1", "tables==3.11.1", "openpyxl==3.1.5")),
     Program("openpyxl", _OPENPYXL, ("openpyxl==3.1.5", "numpy==2.4.6")),
     Program("npTDMS", _NPTDMS, ("npTDMS==1.13.0", "numpy==2.4.6")),
     Program("mat-io", _MATIO, ("mat-io==1.0.2", "numpy==2.4.6")),
-    Program("Sigima", _SIGIMA, ("sigima==1.0.5",)),
+    Program("Sigima", _SIGIMA, ("sigima==1.3.0",)),
+    Program("PyTables", _PYTABLES, ("tables==3.11.1", "numpy==2.4.6")),
     Program("PyMeasure", _PYMEASURE, ("PyMeasure==0.16.0", "numpy==2.4.6")),
     Program("QCoDeS", _QCODES, ("qcodes==0.58.0",)),
     Program(
@@ -225,4 +248,5 @@ PROGRAMS = (
     ),
     Program("suitcase-csv", _BLUESKY, ("suitcase-csv==0.3.0", "bluesky==1.15.1", "numpy==2.4.6")),
     Program("Octave", _OCTAVE, command=("octave-cli", "--norc")),
+    Program("sigrok-cli", _SIGROK, command=("sh",), tool="sigrok-cli"),
 )

@@ -206,7 +206,7 @@ def test_a_description_of_uneven_film_data(tmp_path: Path) -> None:
     assert d["noise_floor_m"] is None
     rows = dict(describe_rows(recording))
     assert rows["rate"] == "uneven, steps of 1 to 2 s"
-    assert rows["nominal stress"] == "0 to 20 kPa"
+    assert rows["nominal stress"] == "0.00 to 20.00 kPa"
     assert rows["kinematics"] == "uniaxial"
     assert rows["source"] == "in.csv"
 

@@ -1,24 +1,5 @@
 """Pages are made with pictures that are not drawn, unless a test is about the pictures."""
 
-from __future__ import annotations
+from tests.tools.sketches import pictures
 
-from xml.sax.saxutils import quoteattr
-
-import pytest
-from matplotlib.figure import Figure
-
-
-def _sketched(figure: Figure, prefix: str, label: str) -> str:
-    """An element as ``svg`` makes it, with the size of ``figure`` and nothing in it."""
-    width, height = 72.0 * figure.get_size_inches()
-    box = f'viewBox="0 0 {width:g} {height:g}"'
-    return f'<svg {box} role="img" aria-label={quoteattr(label)} id="{prefix}-0"></svg>'
-
-
-@pytest.fixture(autouse=True)
-def _pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drawing a figure takes a third of a second, and says nothing about the page around it.
-
-    The pages that a module makes once for all of its tests are made before, with their pictures.
-    """
-    monkeypatch.setattr("dearig.report.pages.html.svg", _sketched)
+__all__ = ["pictures"]

@@ -29,6 +29,7 @@ from dearig.report.pages.laws import law_view
 from dearig.report.pages.seal import check_page
 from dearig.report.stored import Outcome, _hints, restored, stored
 from dearig.report.text import citation
+from tests.deep import mostly_deep
 from tests.tools.command import dearig, done, refused
 from tests.tools.diagnosis import diagnose_outcome, film_diagnosis
 from tests.tools.reports import actuator_comparison, identify_outcome, validate_outcome
@@ -51,7 +52,7 @@ def plain(outcome: Outcome) -> dict[str, object]:
     return {k: v for k, v in result_json(outcome).items() if k != "report"}
 
 
-@pytest.mark.parametrize("kind", ["fit", "diagnosis", "film"])
+@pytest.mark.parametrize("kind", mostly_deep(["fit", "diagnosis", "film"], ["diagnosis"]))
 def test_a_page_made_again_is_the_page(tmp_path: Path, kind: str) -> None:
     first, again, twice = (tmp_path / name for name in ("1.html", "2.html", "3.html"))
     if kind == "fit":

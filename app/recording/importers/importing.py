@@ -44,6 +44,7 @@ __all__ = [
     "Imported",
     "Prepared",
     "UnsureError",
+    "exported_from",
     "import_file",
     "prepare",
 ]
@@ -210,7 +211,7 @@ def prepare(
         reading = part(progress, OPENED, READ)
         table.progress = lambda done: reading("reading", done)
     progress("reading", OPENED)
-    was, doubt = _exported(table)
+    was, doubt = exported_from(table)
     chosen = choose(
         table, options.columns, options.raw, timed=options.rate_Hz is not None,
         table=options.table, guess=options.guess, apart={*was.channels, *was.computed},
@@ -264,7 +265,7 @@ def prepare(
     )
 
 
-def _exported(table: Source) -> tuple[Exported, list[str]]:
+def exported_from(table: Source) -> tuple[Exported, list[str]]:
     """Return the metadata of the recording that ``table`` was exported from, with doubts."""
     if table.about or not path_beside(table.path).is_file():
         return exported(table.about), []

@@ -17,7 +17,7 @@ from dearig.recording.importers.columns.choose import choose
 from dearig.recording.importers.columns.chosen import Chosen, label_in, own_name
 from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
 from dearig.recording.importers.formats.columns import ColumnOverview
-from dearig.recording.importers.importing import OPENED
+from dearig.recording.importers.importing import OPENED, exported_from
 from dearig.recording.importers.quantities.units import UnitScale
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import Source, part_of, printable
@@ -136,10 +136,16 @@ def content_of(
 def _taken(source: Source, raw: Mapping[str, UnitScale]) -> str | None:
     """Return the table that is taken without being asked, "" for all columns; else None."""
     try:
-        chosen = choose(source, {}, raw, timed=False)
+        chosen = choose(source, {}, raw, timed=False, apart=_apart(source))
     except InputError:
         return ""
     return None if chosen.table_choices else printable(chosen.table or "")
+
+
+def _apart(source: Source) -> set[str]:
+    """Return the columns of an exported recording that are no quantities of an import."""
+    was, _ = exported_from(source)
+    return {*was.channels, *was.computed}
 
 
 def _proposal(
@@ -151,7 +157,7 @@ def _proposal(
     places = tuple(numbers[printable(name)] for name in names if printable(name) in numbers)
     digest = _signature(source, names)
     try:
-        chosen = choose(of_table, {}, raw, timed=False)
+        chosen = choose(of_table, {}, raw, timed=False, apart=_apart(source))
     except InputError as error:
         return ColumnGuesses({}, places, digest, (str(error),))
     if chosen.table is not None:  # the columns of a table are proposed with that table

@@ -35,6 +35,8 @@ _NOT_READ = (
     (b"SQLite format 3\0", "an SQLite database", "export the run as CSV or netCDF (QCoDeS does)"),
     (b"CDF\x01", "a netCDF file of the classic format", "nccopy -k nc4 makes an HDF5 file of it"),
     (b"CDF\x02", "a netCDF file of the classic format", "nccopy -k nc4 makes an HDF5 file of it"),
+    (b"<html", "a page of HTML", "open it in a spreadsheet program and save it as .xlsx or CSV"),
+    (b"<table", "a page of HTML", "open it in a spreadsheet program and save it as .xlsx or CSV"),
     (b"ARROW1", "a Feather or Arrow file", "save the table as Parquet (pandas: to_parquet)"),
     (b"\x93NUMPY", "a NumPy array", "it has no names: save the columns as CSV or HDF5"),
     (b"\x1f\x8b", "compressed (gzip)", "unpack it first"),

@@ -47,6 +47,16 @@ def hdf5(voltage: np.ndarray, **attributes: object) -> Write:
     return write
 
 
+def grouped(**attributes: object) -> Write:
+    def write(folder: Path) -> Path:
+        with h5py.File(folder / "in.h5", "w") as file:
+            file["run/time_s"], file["run/voltage_V"], file["run/displacement_mm"] = TIME, HALF, MM
+            file["run"].attrs.update(attributes)
+        return folder / "in.h5"
+
+    return write
+
+
 def in_json(content: object) -> Write:
     def write(folder: Path) -> Path:
         (folder / "in.json").write_text(json.dumps(content), "utf-8")
@@ -87,6 +97,8 @@ SCALED = {
     "an offset": hdf5(VOLTAGE + 5.0, offset=-5.0),
     "a text": hdf5(HALF, scale_factor="2"),
     "JSON": in_json(COLUMNS | {"voltage": {"unit": "V", "factor": 2, "data": HALF.tolist()}}),
+    "JSON beside": in_json(COLUMNS | {"voltage_V": HALF.tolist(), "scales": {"voltage_V": 2}}),
+    "an attribute of the group": grouped(voltage_gain=2.0),
     "Parquet": in_parquet,
     "TDMS": tdms(
         ChannelObject("g", "time_s", TIME), ChannelObject("g", "displacement_mm", MM),
@@ -121,6 +133,13 @@ def test_a_scale_that_changes_nothing_is_none(told: dict[str, object]) -> None:
 def test_a_unit_beside_a_name_that_contradicts_it_is_asked(tmp_path: Path) -> None:
     with refused("in V by its name and in mV by the unit that the file gives.*voltage_UNIT"):
         taken(hdf5(VOLTAGE * 1e3, units="mV")(tmp_path))
+
+
+def test_units_of_the_fields_of_a_compound_dataset(tmp_path: Path) -> None:
+    rows = np.rec.fromarrays([1e3 * TIME, VOLTAGE, MM], names=["time", "voltage", "displacement"])
+    with h5py.File(tmp_path / "in.h5", "w") as file:
+        file.create_dataset("log", data=rows).attrs["units"] = ["ms", "V", "mm"]
+    same(taken(tmp_path / "in.h5"))
 
 
 def given_rate(**attributes: object) -> Write:
@@ -182,6 +201,9 @@ def lvm(folder: Path) -> Path:
         (mat(fs=1e3, decimation=10, voltage_V=VOLTAGE, displacement_mm=MM), "decimation' is 10"),
         (mat(fs=1e3, Ts=0.01, voltage_V=VOLTAGE, displacement_mm=MM), "give the rate of the rows"),
         (lvm, "rate-Hz RATE"),
+        (given_rate(sample_rate=1e3, decimation=10), "rate-Hz RATE"),
+        (text(",".join(NAMES), [*map(str, range(3)), "time_s", "3", "4"], [*"000", NAMES[2], *"12"],
+              [*"000", NAMES[1], *"00"]), "line 5: here are names of columns again"),
         (text("timestamp (s),voltage_V,displacement_mm", 1e3 * (1.8e9 + TIME), VOLTAGE, MM),
          r"count ms from 1970.*'time_ms=timestamp \(s\)\*1'"),
         (text(",".join(NAMES), [str(i) for i in range(ROWS)], TIME, VOLTAGE, MM),
@@ -222,6 +244,10 @@ def test_a_strain_that_a_workbook_shows_in_per_cent(tmp_path: Path) -> None:
         cell.number_format = "0.0%"
     book.save(tmp_path / "in.xlsx")
     np.testing.assert_allclose(taken(tmp_path / "in.xlsx").stretch, 1.0 + 0.5 * TIME, rtol=1e-12)
+    book.active["B9"].number_format = "General"
+    book.save(tmp_path / "in.xlsx")
+    with refused("'Strain.*give them one format"):
+        taken(tmp_path / "in.xlsx")
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ __all__ = ["markers_in"]
 FAR, FAR_CODE = 100.0, 2.0
 #: Markers of one column, at most: too near and too far; readings, and different ones, at least.
 _KINDS, _REPEATED, _DIFFERENT = 2, 2, 10
+#: Values that are compared with each other first: mostly they are enough.
+_SOME = 1000
 #: SCPI says 9.9E37 of what is too large, and 9.91E37 of what is no number.
 OVERFLOW = 9.9e36
 _CODES = frozenset({7999.0, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0})
@@ -28,20 +30,23 @@ def markers_in(values: np.ndarray, codes_only: bool = False) -> tuple[np.ndarray
     bring far off, both.
     """
     none = np.zeros(values.size, dtype=bool)
-    with np.errstate(invalid="ignore"):
-        overflow = np.abs(values) >= OVERFLOW
-    if overflow.any() and 2 * int(overflow.sum()) < values.size:
-        others, more = markers_in(np.where(overflow, np.nan, values), codes_only)
-        return others | overflow, [*np.unique(values[overflow]).tolist()[:_KINDS], *more]
-    if not values.size or not (_is_repeated(values) or _is_code(_extreme(values))):
+    if not values.size:
+        return none, []
+    extreme = _extreme(values)
+    if abs(extreme) >= OVERFLOW:
+        overflow = (np.abs(values) >= OVERFLOW) & np.isfinite(values)
+        if 0 < 2 * int(overflow.sum()) < values.size:
+            others, more = markers_in(np.where(overflow, np.nan, values), codes_only)
+            return others | overflow, [*np.unique(values[overflow]).tolist()[:_KINDS], *more]
+    if not (_is_code(extreme) or (_is_repeated(values, extreme) and not codes_only)):
         return none, []
     size = np.abs(values)
-    marked = np.zeros(values.size, dtype=bool)
+    size[~np.isfinite(size)] = -1.0
+    marked = none.copy()
     found: list[float] = []
-    while len(found) < _KINDS and not marked.all():
-        left = np.where(marked | ~np.isfinite(size), -1.0, size)
-        extreme = float(left.max())
-        same = left == extreme
+    while len(found) < _KINDS:
+        extreme = float(size.max())
+        same = size == extreme
         kinds = np.unique(values[same]).tolist()
         code = _is_code(extreme)
         if extreme <= 0.0 or len(kinds) + len(found) > _KINDS or (codes_only and not code):
@@ -50,13 +55,20 @@ def markers_in(values: np.ndarray, codes_only: bool = False) -> tuple[np.ndarray
             break
         marked |= same
         found += kinds
-        rest = size[~marked & np.isfinite(size)]
-        if 2 * int(marked.sum()) > values.size or not rest.size:
+        size[same] = -1.0
+        largest = float(size.max())
+        if 2 * int(marked.sum()) > values.size or largest <= 0.0:
             break
         far = FAR_CODE if all(map(_is_code, found)) else FAR
-        if 0.0 < far * float(rest.max()) <= extreme and np.unique(rest).size >= _DIFFERENT:
+        if far * largest <= extreme and _are_different(size):
             return marked, found
     return none, []
+
+
+def _are_different(size: np.ndarray) -> bool:
+    """Return True if enough of the sizes (n,) that are left, from 0 on, differ."""
+    some = size[:: max(size.size // _SOME, 1)]
+    return any(np.unique(part[part >= 0.0]).size >= _DIFFERENT for part in (some, size))
 
 
 def _is_code(value: float) -> bool:
@@ -72,7 +84,6 @@ def _extreme(values: np.ndarray) -> float:
     return high if high >= -low else low
 
 
-def _is_repeated(values: np.ndarray) -> bool:
+def _is_repeated(values: np.ndarray, extreme: float) -> bool:
     """Return True if the value farthest from 0 is there twice; most readings end here."""
-    extreme = _extreme(values)
     return int(np.count_nonzero(values == extreme)) >= _REPEATED or bool((values == -extreme).any())

@@ -17,6 +17,8 @@ _DAY, _NEXT_DAY, _SUMMER = 86_400.0, 43_200.0, 3600.0
 #: Usual steps from which a step is a jump, and jumps that are named at most: more are the pauses
 #: of a logger that writes when something happens.
 _JUMP, _JUMPS_MAX = 100.0, 3
+#: Steps from which the usual one is found, at most, and steps that are looked at in one go.
+_SOME = 2**17
 
 
 def one_clock(
@@ -54,20 +56,24 @@ def jumps(time: np.ndarray, place: Callable[[int], str]) -> list[str]:
     A clock may have been set forward, or a second run appended. ``place`` says where a row is in
     the file.
     """
-    steps = np.diff(time)
-    usual = float(np.median(steps)) if steps.size else 0.0
-    found = np.flatnonzero(steps >= _JUMP * usual)
-    if not 0.0 < usual < _SUMMER / 2.0 or found.size > _JUMPS_MAX:
+    some = np.arange(0, time.size - 1, max(time.size // _SOME, 1))
+    usual = float(np.median(time[some + 1] - time[some])) if some.size else 0.0
+    if not 0.0 < usual < _SUMMER / 2.0:
         return []
+    found: list[int] = []
+    for first in range(0, time.size, _SOME):
+        steps = np.diff(time[first : first + _SOME + 1])
+        found += (first + np.flatnonzero(steps >= _JUMP * usual)).tolist()
+        if len(found) > _JUMPS_MAX:
+            return []
     return [
-        f"the time jumps by {steps[at]:g} s after {place(at)}, and goes on in steps of "
-        f"{usual:g} s: "
+        f"the time jumps by {step:g} s after {place(at)}, and goes on in steps of {usual:g} s: "
         + (
             "did summer time begin?"
-            if abs(steps[at] - _SUMMER - usual) <= 0.5 * usual
+            if abs(step - _SUMMER - usual) <= 0.5 * usual
             else "was the clock set, or another run appended?"
         )
-        for at in found.tolist()
+        for at, step in ((at, float(time[at + 1] - time[at])) for at in found)
     ]
 
 

@@ -282,9 +282,13 @@ def _read(
     if "time" in picked:
         _check_epoch(chosen, picked["time"], table["time"])
         table["time"] = _counted_by_sixties(chosen, picked["time"], table["time"], values)
-    found = {
-        q: picked[q].scale.apply(column) if q in picked else column for q, column in table.items()
-    }
+    # a column at a time: what it was read from is given back
+    del raw
+    found = {}
+    for q in list(table):
+        column = table.pop(q)
+        found[q] = picked[q].scale.apply(column) if q in picked else column
+    del column
     if found["time"].size < 2:
         raise InputError(f"{path} has {found['time'].size} row of data; at least 2 are needed")
     if "time" in picked:

@@ -190,18 +190,28 @@ class _Sheet:
         return self._wrong.get((column.place, row), "there is no value")
 
     def _formats(self) -> dict[int, Shown]:
-        """Return what the number formats of the first row make of its numbers, by place."""
+        """Return what the number formats of the first rows make of their numbers, by place.
+
+        Raises ``InputError`` for a column that shows some numbers as they are and others not.
+        """
         at = self.layout.first + 1
+        formats: dict[int, set[Shown]] = {}
         with _opened(self.path, values=True) as book:
             sheet = book[self.name]
             sheet.reset_dimensions()
-            row = next(iter(sheet.iter_rows(min_row=at, max_row=at)), ())
-            formats = {
-                place: shown_by(str(getattr(cell, "number_format", "")))
-                for place, cell in enumerate(row)
-                if isinstance(cell.value, (int, float))
-            }
-        return {place: shown for place, shown in formats.items() if shown != Shown()}
+            for row in sheet.iter_rows(min_row=at, max_row=at + HEAD_ROWS):
+                for place, cell in enumerate(row):
+                    if isinstance(cell.value, (int, float)):
+                        shown = shown_by(str(getattr(cell, "number_format", "")))
+                        formats.setdefault(place, set()).add(shown)
+        for column in self.layout.columns:
+            if len({shown.times for shown in formats.get(column.place, ())}) > 1:
+                raise InputError(
+                    f"{self.path}, sheet {printable(self.name)!r}: some cells of column "
+                    f"{column.name!r} show their numbers in per cent or in thousands, and others "
+                    f"as they are: give them one format"
+                )
+        return {place: max(shown, key=lambda one: one.unit) for place, shown in formats.items()}
 
     def notes(self) -> Iterator[str]:
         """Yield a sentence for each column whose numbers are taken as its cells show them."""

@@ -10,7 +10,12 @@ from collections.abc import Callable
 import h5py
 import numpy as np
 
-from dearig.recording.importers.formats.stored import rate_step, stated_scale
+from dearig.recording.importers.formats.stored import (
+    is_thinned,
+    rate_step,
+    scale_of,
+    stated_scale,
+)
 from dearig.recording.importers.source import PARSER_FAILURES
 
 __all__ = [
@@ -91,7 +96,16 @@ def own_scale(data: h5py.Dataset) -> str:
         for name in data.attrs
         if name not in _OF_CF or not numbers_in(data, name)
     }
-    return stated_scale(told, integers=data.dtype.kind in "iu")
+    if own := stated_scale(told, integers=data.dtype.kind in "iu"):
+        return own
+    # of its group: a scale that is called as the dataset is, or a plain one
+    group, called = data.parent, data.name.rpartition("/")[2]
+    beside = (
+        (name, numbers_in(group, name)) for name in group.attrs
+        if scale_of(name, called) or name.lower() in ("gain", "scale")
+    )  # fmt: skip
+    found = next(((n, v) for n, v in beside if set(v) - {1.0}), None)
+    return f"{found[0]} = {', '.join(f'{one:g}' for one in found[1][:4])}" if found else ""
 
 
 #: Attributes by which CF scales, if they are numbers.
@@ -100,18 +114,19 @@ _OF_CF = ("scale_factor", "add_offset")
 
 def stated_step(data: h5py.Dataset) -> float | None:
     """Return the time in s from row to row that an attribute of ``data`` or its groups gives."""
-    owner = data
+    owner, found = data, None
     for _ in range(GROUPS_MAX):
         for name in owner.attrs:
             value = next(iter(numbers_in(owner, name)), 0.0)
             unit = next((u for e in _UNIT_OF for u in texts_in(owner, name + e)[:1]), "")
+            if is_thinned(name, value):
+                return None
             step = rate_step(f"{name}_{unit}" if unit else name, value)
-            if step is not None:
-                return step
+            found = step if found is None else found
         if owner.name == "/":
-            return None
+            break
         owner = owner.parent
-    return None
+    return found
 
 
 #: Groups above a dataset in which attributes are looked for, at most.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -217,7 +218,9 @@ class _Walk:
             if data.shape == () and {"base", "limit", "increment"} <= set(data.dtype.names):
                 yield from self._in_range(data, path)
             return
-        for name in data.dtype.names[:MATRIX_MAX]:
+        fields = data.dtype.names
+        units = next((u for key in _UNITS if len(u := _texts(data, key)) == len(fields)), [])
+        for name, unit in itertools.zip_longest(fields[:MATRIX_MAX], units[:MATRIX_MAX]):
             kind = data.dtype[name]
             if kind.base.kind not in "fiu" or len(kind.shape) > 1:
                 continue
@@ -237,7 +240,7 @@ class _Walk:
                     f"{path}{self._between}{called}",
                     Stored(
                         self._loader(data.name, _field(name, place), None, times),
-                        int(data.size), own, "s" if times else "",
+                        int(data.size), own, "s" if times else unit or "",
                         "time" if times else "", path,
                     ),
                 )  # fmt: skip

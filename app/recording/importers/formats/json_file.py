@@ -42,6 +42,9 @@ _VALUES, _NAMES, _UNITS = (
     ("unit", "units", "unit_string"),
 )
 
+#: Names of an object that gives each column its scale.
+_SCALES = ("scale", "scales", "gain", "gains", "factor", "factors", "offset", "offsets")
+
 
 class JsonFile(StoredColumns):
     """The JSON file at ``path``. Raises ``InputError`` if it is none or has no columns of numbers.
@@ -130,13 +133,20 @@ def _in_object(
         inside = f"{path}.{key}" if path else key
         unit = units.get(key) if isinstance(units, Mapping) else None
         unit = unit or value.get(f"{key}_unit") or value.get(f"{key}_units")
+        beside = {
+            word: by_name for word in _SCALES if isinstance(by_name := value.get(word), Mapping)
+        }
+        scaled = stated_scale(
+            {word: by_name[key] for word, by_name in beside.items() if key in by_name}
+        )
         one = _described(inner)
         if one is not None:
-            yield inside, _stored(one.values, key, path, one.unit, one.name, one.scaled)
+            yield inside, _stored(one.values, key, path, one.unit, one.name, one.scaled or scaled)
             continue
         for name, column in _columns(inner, inside, path, False, depth + 1):
-            if name == inside and isinstance(unit, str):
-                yield name, _stored(_values(inner), key, path, unit)
+            if name == inside and (isinstance(unit, str) or scaled):
+                unit = unit if isinstance(unit, str) else ""
+                yield name, _stored(_values(inner), key, path, unit, scaled=scaled)
             else:
                 yield name, column
 

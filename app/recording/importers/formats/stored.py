@@ -21,7 +21,15 @@ from dearig.recording.importers.source import (
     no_such_column,
 )
 
-__all__ = ["Stored", "StoredColumns", "as_numbers", "rate_step", "stated_scale"]
+__all__ = [
+    "Stored",
+    "StoredColumns",
+    "as_numbers",
+    "is_thinned",
+    "rate_step",
+    "scale_of",
+    "stated_scale",
+]
 
 
 @dataclass(frozen=True)
@@ -115,12 +123,9 @@ class StoredColumns(NamedColumns[Stored]):
         """Scales that the file states beside the values, by column: with them, or as a setting."""
         found = {name: column.scaled for name, column in self._columns.items() if column.scaled}
         for setting, one in self._settings.items():
-            word = _GAIN_OF.fullmatch(one.own.lower())
-            value = None if word is None else self.read_setting(setting)
-            if word is None or value in (None, 1.0):
-                continue
-            for name, column in self._columns.items():
-                if column.own.lower().startswith(word["of"]):
+            value = self.read_setting(setting)
+            for name, column in self._columns.items() if value not in (None, 1.0) else ():
+                if scale_of(one.own, column.own):
                     found.setdefault(name, f"{setting} = {value:g}")
         return found
 
@@ -175,7 +180,7 @@ class StoredColumns(NamedColumns[Stored]):
                 continue
             if (step := rate_step(one.own, value)) is not None:
                 steps[name] = step
-            elif _THINNED.match(one.own) and value != 1.0:
+            elif is_thinned(one.own, value):
                 thinned.append(f"{name!r} is {value:g}")
         if not steps:
             return None
@@ -299,6 +304,17 @@ _OFFSETS = frozenset({"offset", "intercept", "add_offset", "y_intercept"})
 _GAIN_OF = re.compile(rf"(?P<of>[^\W_]\w*?)_?(?:{'|'.join(sorted(_GAINS, reverse=True))})")
 
 
+def is_thinned(name: str, value: float) -> bool:
+    """Return True if the setting ``name`` says that fewer rows are stored than were sampled."""
+    return _THINNED.match(name) is not None and value not in (0.0, 1.0)
+
+
+def scale_of(setting: str, column: str) -> bool:
+    """Return True if ``setting`` is called as the scale of ``column``, such as voltage_scale."""
+    match = _GAIN_OF.fullmatch(setting.lower())
+    return match is not None and column.lower().startswith(match["of"])
+
+
 def stated_scale(told: Mapping[str, object], integers: bool = False) -> str:
     """Return the first scale or offset that stands beside a column, such as "gain = 2", or "".
 
@@ -306,6 +322,7 @@ def stated_scale(told: Mapping[str, object], integers: bool = False) -> str:
     """
     for name, value in told.items():
         plain = re.sub(r"[\s-]+", "_", name.strip().lower())
+        plain = plain if plain in _GAINS | _OFFSETS else plain.removesuffix("s")
         neutral = 0.0 if plain in _OFFSETS else 1.0
         if plain not in _GAINS | _OFFSETS and not (integers and plain in _OF_INTEGERS):
             continue

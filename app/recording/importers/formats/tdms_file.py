@@ -18,7 +18,13 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import one_line
-from dearig.recording.importers.formats.stored import Stored, StoredColumns, rate_step, stated_scale
+from dearig.recording.importers.formats.stored import (
+    Stored,
+    StoredColumns,
+    is_thinned,
+    rate_step,
+    stated_scale,
+)
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.units import UNITS, unit_of
 from dearig.recording.importers.source import PARSER_FAILURES, printable
@@ -103,8 +109,10 @@ def _step(channel: TdmsChannel, above: Mapping[str, object]) -> tuple[float | No
         along = unit_of(str(told.get("wf_xunit_string", "")) or "s")
         scale = UNITS["time"].get(along[0]) if along else None
         return None if scale is None else step * scale.times / scale.over, unit
-    given = {**above, **told}.items()
-    steps = (rate_step(name, _number(value)) for name, value in given)
+    given = {name: _number(value) for name, value in {**above, **told}.items()}
+    if any(is_thinned(name, value) for name, value in given.items()):
+        return None, unit
+    steps = (rate_step(name, value) for name, value in given.items())
     return next((found for found in steps if found is not None), None), unit
 
 

@@ -39,6 +39,7 @@ from dearig.recording.importers.formats.text_layout import (
     HEAD_CHARACTERS,
     TextColumn,
     TextLayout,
+    is_line_of_names,
     layout_of,
 )
 from dearig.recording.importers.formats.text_lines import cells_of, encoding_of, holds_data
@@ -199,9 +200,12 @@ class TextFile(NamedColumns[TextColumn]):
     def _read_section(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         while True:
             wanted = [self._ordered(name) for name in dict.fromkeys(names)]
+            wrong: _WrongCellError | None = None
             try:
                 table = self._read_rows(wanted, self._skip)
-            except _WrongCellError as wrong:
+            except _WrongCellError as error:
+                wrong = error.with_traceback(None)  # which would keep the rows that were read
+            if wrong is not None:
                 if wrong.grouped and self._decide(wrong.column):
                     continue
                 if wrong.column in self.optional:
@@ -226,7 +230,7 @@ class TextFile(NamedColumns[TextColumn]):
         """
         self.skipped, self._spans, self._wanted, self._pointed = [], [], wanted, set()
         self._leaves_out, self._counts = skip, counts
-        table = Table(len(wanted))
+        table = Table(0 if counts else len(wanted))
         size = left = self._size
         for line, block, values in self._parsed():
             self._keep(line, block, values, table, left)
@@ -459,6 +463,12 @@ usecols=sorted(places), dtype=str, na_filter=False,
             fault, values, column = self._row(content, self._wanted)
             if not fault:
                 rows.append(values)
+            elif is_line_of_names(content, self.layout):
+                raise InputError(
+                    f"{self.path}, line {number}: here are names of columns again, others than "
+                    f"those above: the rows behind them may be of another order and other units; "
+                    f"make two files of it"
+                )
             elif self._leaves_out and column not in self.optional:
                 self.skipped.append((before + len(rows), f"line {number}"))
                 lost = len(self.skipped)

@@ -42,6 +42,7 @@ __all__ = [
     "HEAD_CHARACTERS",
     "TextColumn",
     "TextLayout",
+    "is_line_of_names",
     "is_row",
     "layout_of",
 ]
@@ -571,6 +572,16 @@ def is_row(line: str, layout: TextLayout) -> bool:
     except csv.Error:
         return False
     return len(cells) == layout.cells and _is_data(cells, strict=False)
+
+
+def is_line_of_names(line: str, layout: TextLayout) -> bool:
+    """Return True if ``line`` names quantities in several columns, others than the layout's."""
+    try:
+        cells = cells_of(bare(line), layout.delimiter)
+    except csv.Error:
+        return False
+    again = all(c.place < len(cells) and cells[c.place] == c.own for c in layout.columns)
+    return sum(map(_says, cells)) >= NAMED_MIN and not any(map(is_number, cells)) and not again
 
 
 def _is_data(cells: Sequence[str], strict: bool) -> bool:
