@@ -117,7 +117,8 @@ def acts(window: MainWindow, folder: Path) -> Iterator[tuple[str, Callable[[], o
             lambda place=place: recordings.views.setCurrentIndex(place),
         )
     window.show_page(study)
-    view = view_of(study_on_paper(folder / "study-1", diagnose_outcome(title="bench")))
+    paper = folder / f"study-{1 + len([*folder.glob('study-*')])}"
+    view = view_of(study_on_paper(paper, diagnose_outcome(title="bench")))
     yield "Study: check all", lambda: study.recordings.check(paths[1:], paths[:1])
     yield "Study: check none", lambda: study.recordings.check([], [])
     yield "Study: a result arrives", lambda: study.show_view(view)
@@ -164,7 +165,7 @@ def measure(
     until(lambda: window.session.preview is not None)
     if ready:
         # the comparisons with the model go on for minutes, and stop during a run
-        until(lambda: window.idle_pages.done and len(window.library.summaries) == MANY)
+        until(lambda: window.idle_pages.done and len(window.library.summaries) >= MANY)
     run_event_loop(1.0)
     until(lambda: run.arm_button.isEnabled() and run.arm_button.answers)
     run.runner.arm(True)

@@ -122,6 +122,7 @@ MEASUREMENTS = {
         "Time and memory of importing a large CSV file", ("tests.benchmarks.bench_import",)
     ),
     "window": Measurement("Drawing speed of the window", ("tests.benchmarks.bench_window",)),
+    "stop": Measurement("Time until STOP is heard during a run", ("tests.benchmarks.bench_stop",)),
     "ni-component-tests": Measurement(
         "NI's own tests of its library, against the simulated card",
         ("tests.benchmarks.bench_ni_component_tests --source nidaqmx-python",),

@@ -148,6 +148,13 @@ def test_a_space_does_not_write_where_nothing_can_be_written(
     page.operator.setReadOnly(True)
     strike(page.operator, Qt.Key.Key_Space)
     assert not page.runner.armed
+    # an input method writes past the window, into what has the focus
+    press(qtbot, page.arm_button)
+    page.operator.setFocus()
+    typed = QInputMethodEvent()
+    typed.setCommitString(" ")
+    QApplication.sendEvent(QApplication.focusObject(), typed)
+    assert not page.runner.armed
 
 
 def test_esc_closes_what_is_open_before_it_stops(
