@@ -11,7 +11,9 @@ between samples, which the record does not say. The truth is inside the model's 
 counted is whether the intervals are honest, not whether the model is right. With each share stands
 its own 95 % interval (Clopper and Pearson), and the RMS of the errors in units of what the interval
 says. Where the model has the law of the rig, its chi-square is compared with the least of a fit
-that starts at the true numbers.
+that starts at the true numbers. The parameters of a rig miss together, so that a count of intervals
+scatters more than it says; what is independent is one number of each rig: by how much chi-square is
+larger at the true numbers than at the fit, which has the chi-square distribution of the parameters.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import beta, chi2
 
 from dearig.acquisition.run import RunOptions
 from dearig.acquisition.run import record as run
@@ -144,6 +146,23 @@ def above_best(record: ActuatorRecord, found: Actuator, true: Actuator) -> float
     return float(here - best.cost) * problem.samples
 
 
+def from_truth(record: ActuatorRecord, found: Actuator, true: Actuator) -> tuple[float, int]:
+    """Return by how much chi-square is larger at the ``true`` numbers, and how many they are.
+
+    Over the mean square of the fit: what a short lead-in says of the noise scatters by some
+    per cent.
+    """
+    at_fit, at_truth = (
+        WhitenedProblem([record], FitLayout(model), workers=1, fidelity=kernel.CAREFUL)
+        for model in (found, true)
+    )
+    here, there = (
+        p.costs(p.layout.coordinates(p.layout.initial())[None])[0] for p in (at_fit, at_truth)
+    )
+    limits = sum(q.kind == "J" for q in at_fit.layout.quantities)
+    return float(there / here - 1.0) * at_fit.samples, at_fit.layout.size - limits
+
+
 def hiding(seed: int, generator: str) -> tuple[Actuator, ActuatorRecord, str]:
     """Return the plain film of the rig of ``seed``, its record, and what the rig hides."""
     case = drawn(seed, generator)
@@ -196,7 +215,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="threads of a fit [2]")
     given = parser.parse_args()
     counts: dict[str, Count] = {}
-    others, above = 0, []
+    others, above, distances = 0, [], []
     seeds = range(given.first, given.first + given.rigs)
     if given.hidden:
         count_hidden(counts, seeds, given.hidden)
@@ -213,6 +232,7 @@ def main() -> None:
             if names == (effects[0][0],):
                 missed = count(counts, finding.final.estimates, truths(model))
                 above.append(above_best(record, finding.final.model, model))
+                distances.append(from_truth(record, finding.final.model, model))
             else:
                 # another law's parameters have no truth
                 others, missed = others + 1, []
@@ -221,6 +241,7 @@ def main() -> None:
             said = f"cost {fit.cost:.3f}, correlation {fit.correlation:.2f}"
             missed = count(counts, fit.estimates, truths(model))
             above.append(above_best(record, fit.model, model))
+            distances.append(from_truth(record, fit.model, model))
         spent = time.perf_counter() - started
         over = f"{above[-1]:.2f}" if above else "?"
         print(
@@ -239,6 +260,14 @@ def main() -> None:
         near = sum(a <= 1.0 for a in above)
         print(f"\nChi-square within 1 of the least from the truth: {near} of {len(above)}.")
         print(f"The largest excess is {max(above):.2f}.")
+    if distances:
+        far, numbers = np.array(distances).T
+        beyond = int(np.count_nonzero(far > chi2.ppf(0.95, numbers)))
+        print(
+            f"Chi-square is {np.mean(far):.2f} larger at the true numbers, {np.mean(numbers):.2f} "
+            f"expected (p = {chi2.sf(far.sum(), numbers.sum()):.2g}); beyond 95 % of its "
+            f"distribution are {beyond} of {far.size} rigs, {0.05 * far.size:.1f} expected."
+        )
     if others:
         print(f"\n{others} rigs were explained by another law and are not counted.")
 
