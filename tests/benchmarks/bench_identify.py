@@ -1,20 +1,26 @@
 """How long an identification takes: hybrid beside Algorithm 1, and this revision beside another.
 
-Run as ``python -m tests.benchmarks.bench_identify [PYTHON]``. Without an argument: one period of
-the thesis's identification record at its 10 ms sampling, made by Table 3's film, with 1 um noise.
-Algorithm 1 as printed runs once for each of three seeds, the hybrid three times; medians, on a
-machine that may have other work.
+Run as ``python -m tests.benchmarks.bench_identify [PYTHON [commands]]``. Without an argument: one
+period of the thesis's identification record at its 10 ms sampling, made by Table 3's film, with
+1 um noise. Algorithm 1 as printed runs once for each of three seeds, the hybrid three times;
+medians, on a machine that may have other work.
 
 ``PYTHON`` is the interpreter of another checkout's environment. Then the two take turns, each in a
 process of its own, on one thread: the thesis's record of two periods and of five at 1 kHz, with
 intervals and without. Processor seconds, ratios turn by turn, and the costs that are reached.
+
+With ``commands`` whole commands take turns, once each: recordings of simulated rigs, made by the
+other, are identified, and diagnosed with a validation recording. This works with revisions whose
+modules have other names. Both have to have compiled their kernels.
 """
 
 import json
 import os
+import resource
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 
@@ -77,6 +83,41 @@ def beside(other: str) -> None:
         )
 
 
+#: Seeds of the simulated rigs whose recordings are identified and diagnosed.
+RIGS = (7, 11, 12, 13, 2003)
+
+
+def command(interpreter: str, folder: str, *words: str) -> float:
+    """Run a command in ``folder``; return the processor seconds of its process."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        [interpreter, "-m", "dearig", *words, "--force"], cwd=folder, check=True,
+        capture_output=True, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    )  # fmt: skip
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def commands_beside(other: str) -> None:
+    """Print what whole commands of the interpreter ``other`` and of this one take, in turns."""
+    print("| command | other (s) | this (s) | ratio |\n|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in RIGS:
+            train, check = f"thesis-{seed}.h5", f"check-{seed}.h5"
+            command(other, folder, "record", "thesis", "--rig", f"sim:{seed}", "--out", train)
+            command(
+                other, folder, "record", "validation-b-7.0", "--rig", f"sim:{seed}", "--seed", "1",
+                "--out", check,
+            )  # fmt: skip
+            for words in (
+                ("identify", train, "--out", "model.toml"),
+                ("diagnose", train, "--validate", check),
+            ):
+                then, now = (command(i, folder, *words) for i in (other, sys.executable))
+                name = f"{words[0]}, sim:{seed}"
+                print(f"| {name} | {then:.1f} | {now:.1f} | {now / then:.2f} |", flush=True)
+
+
 def main() -> None:
     actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
     segment = Sequence.thesis(periods=1).segments[0]
@@ -118,6 +159,8 @@ def main() -> None:
 if __name__ == "__main__":
     if sys.argv[1:] == ["measure"]:
         print(json.dumps(measured()))
+    elif sys.argv[2:] == ["commands"]:
+        commands_beside(sys.argv[1])
     elif sys.argv[1:]:
         beside(sys.argv[1])
     else:
