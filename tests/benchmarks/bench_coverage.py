@@ -1,19 +1,20 @@
 """How often the 95 % intervals of `identify` and `diagnose` hold the truth, on simulated rigs.
 
 Run as ``python -m tests.benchmarks.bench_coverage --rigs 100``, with ``--diagnose`` for the other.
-Each rig has a film of three branches and one noise, drawn by its seed; ``--diagnose`` gives it one
-effect of a list beside that, in turn. With ``--hidden`` the rigs are those of the blind test that
-hide an effect: `identify` has a model without it, and only the intervals of fits that it does not
-call rejected are counted. Each rig makes the thesis's identification record, with a lead-in
-of 2 s, white noise, and the steps of a 16-bit converter, which holds the voltage; displacement is
-counted from the mean of the lead-in, as in a recording. With ``--table`` the voltage is straight
-between samples, which the record does not say. The truth is inside the model's class: what is
-counted is whether the intervals are honest, not whether the model is right. With each share stands
-its own 95 % interval (Clopper and Pearson), and the RMS of the errors in units of what the interval
-says. Where the model has the law of the rig, its chi-square is compared with the least of a fit
-that starts at the true numbers. The parameters of a rig miss together, so that a count of intervals
-scatters more than it says; what is independent is one number of each rig: by how much chi-square is
-larger at the true numbers than at the fit, which has the chi-square distribution of the parameters.
+Each rig has a film of two to four branches (``--branches``, ``--near``) and one noise, drawn by its
+seed; ``--diagnose`` gives it one effect of a list beside that, in turn. With ``--hidden`` the rigs
+are those of the blind test that hide an effect: `identify` has a model without it, and only the
+intervals of fits that it does not call rejected are counted. Each rig makes the thesis's
+identification record, with a lead-in of 2 s, white noise, and the steps of a 16-bit converter,
+which holds the voltage; displacement is counted from the mean of the lead-in, as in a recording.
+With ``--table`` the voltage is straight between samples, which the record does not say. The truth
+is inside the model's class: what is counted is whether the intervals are honest, not whether the
+model is right. With each share stands its own 95 % interval (Clopper and Pearson), and the RMS of
+the errors in units of what the interval says. Where the model has the law of the rig, its chi-
+square is compared with the least of a fit that starts at the true numbers. The parameters of a rig
+miss together, so that a count of intervals scatters more than it says; what is independent is one
+number of each rig: by how much chi-square is larger at the true numbers than at the fit, which has
+the chi-square distribution of the parameters.
 """
 
 from __future__ import annotations
@@ -87,13 +88,21 @@ class Count:
         )
 
 
-def rig_of(seed: int, effects: EffectValues = ()) -> tuple[Actuator, float]:
-    """Return the rig of ``seed`` and its noise in m."""
+def rig_of(
+    seed: int, effects: EffectValues = (), branches: int = 3, near: bool = False
+) -> tuple[Actuator, float]:
+    """Return the rig of ``seed`` and its noise in m; ``near`` brings two times within a tenth."""
     rng = np.random.default_rng(seed)
     moduli = rng.uniform((35e3, 20e3, 10e3, 5e3), (60e3, 60e3, 40e3, 20e3))
     times = np.exp(rng.uniform(np.log((0.15, 0.8, 4.0)), np.log((0.5, 2.5, 12.0))))
     noise = math.exp(rng.uniform(math.log(0.7e-6), math.log(3e-6)))
-    network = Network.gent(tuple(moduli), (1e4,) * 4, tuple(times))
+    if branches == 4:
+        moduli = np.append(moduli, rng.uniform(5e3, 20e3))
+        times = np.insert(times, 0, math.exp(rng.uniform(math.log(0.03), math.log(0.08))))
+    moduli, times = moduli[: branches + 1], times[:branches]
+    if near:
+        times[1] = times[0] * rng.uniform(1.01, 1.1)
+    network = Network.gent(tuple(moduli), (1e4,) * moduli.size, tuple(times))
     return Actuator(THESIS_FILM, THESIS_LOAD, network, effects), noise
 
 
@@ -205,6 +214,8 @@ def main() -> None:
     parser.add_argument("--rigs", type=int, default=100, help="rigs [100]")
     parser.add_argument("--first", type=int, default=0, help="first seed [0]")
     parser.add_argument("--rate", type=float, default=1000.0, help="Hz [1000]")
+    parser.add_argument("--branches", type=int, choices=(2, 3, 4), default=3, help="[3]")
+    parser.add_argument("--near", action="store_true", help="two relaxation times nearly equal")
     parser.add_argument("--diagnose", action="store_true", help="diagnose rigs with one effect")
     parser.add_argument(
         "--table", action="store_true", help="do not say that the voltage is held between samples"
@@ -222,7 +233,7 @@ def main() -> None:
     for seed in () if given.hidden else seeds:
         started = time.perf_counter()
         effects = EFFECTS_DRAWN[seed % len(EFFECTS_DRAWN)] if given.diagnose else ()
-        model, noise = rig_of(seed, effects)
+        model, noise = rig_of(seed, effects, given.branches, given.near)
         record = record_of(model, noise, given.rate, seed, not given.table)
         base = replace(model, effects=())
         if given.diagnose:

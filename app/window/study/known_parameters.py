@@ -10,6 +10,8 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from dearig.config.parameterfile import Stated, load_parameter_file
 from dearig.errors import InputError
+from dearig.report.text.numbers import symbol
+from dearig.units import name_and_unit
 from dearig.window.documents.dialogs import choose_file
 from dearig.window.kit.widgets import ElidedLabel, Message, button
 from dearig.window.session.state import Session
@@ -17,9 +19,8 @@ from dearig.window.session.state import Session
 __all__ = ["KnownParameters"]
 
 _TIP = (
-    "Choose a parameter file (TOML) that says what is known. It has a table for each parameter, as "
-    "[mu_0_kPa], and in it a prior (mean = 46.0 and sd = 0.5), bounds (low = 10.0, high = 90.0) or "
-    "a value that is not fitted (fixed = 20.0)"
+    "Choose a parameter file (TOML) that says what is known of parameters: a prior by its mean and "
+    "standard deviation, bounds, or a value that is not fitted"
 )
 
 
@@ -71,7 +72,7 @@ class KnownParameters(QWidget):
 
     def _show(self, stated: Stated) -> None:
         self.trouble.show_text("")
-        said = "; ".join(f"{name}: {_words(table)}" for name, table in stated.items())
+        said = "; ".join(_text(name, table) for name, table in stated.items())
         self.shown.show_text(
             said or "no known parameters", f"{self.path}: {said}" if said else _TIP
         )
@@ -87,5 +88,15 @@ class KnownParameters(QWidget):
             self.open_file(path)
 
 
-def _words(table: Mapping[str, float]) -> str:
-    return ", ".join(f"{key} {value:g}" for key, value in table.items())
+def _text(key: str, table: Mapping[str, float]) -> str:
+    """Return what the ``table`` of a parameter states, as "μ₀ (kPa): 46 ± 0.5"."""
+    name, unit = name_and_unit(key)
+    parts = []
+    if "fixed" in table:
+        parts.append(f"{table['fixed']:g}, not fitted")
+    if "mean" in table:
+        parts.append(f"{table['mean']:g} ± {table['sd']:g}")
+    ends = {"low": "from {:g}", "high": "up to {:g}"}
+    parts += [text.format(table[end]) for end, text in ends.items() if end in table]
+    shown = symbol(name.replace(" ", "_")).replace("_", " ").replace(".", ": ")
+    return f"{shown} ({unit}): {', '.join(parts)}" if unit else f"{shown}: {', '.join(parts)}"

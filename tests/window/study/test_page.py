@@ -286,7 +286,7 @@ def test_what_is_known_of_parameters_goes_into_the_fit(
         "mu_1_kPa": {"mean": 20.0, "sd": 2.0},
         "T_1_s": {"fixed": 0.5},
     }
-    assert page.known.shown.full_text == "mu_1_kPa: mean 20, sd 2; T_1_s: fixed 0.5"
+    assert page.known.shown.full_text == "μ₁ (kPa): 20 ± 2; T₁ (s): 0.5, not fitted"
     faulty = tmp_path / "faulty.toml"
     faulty.write_text("[mu_1_kPa]\nmiddle = 20.0\n", "utf-8")
     page.known.open_file(faulty)
