@@ -9,6 +9,7 @@ import pytest
 
 from dearig.model.fitting import identify
 from dearig.model.fitting.estimates import estimates_with_intervals
+from dearig.model.fitting.identify import coarse_problem
 from dearig.model.fitting.intervals import firm_directions, linear_widths
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.thinning import thinned
@@ -67,3 +68,13 @@ def test_branches_that_hardly_differ_have_no_linear_interval() -> None:
         assert directions.shape[1] == int(free.sum()) - loose
         widths = linear_widths(jacobian, 2.0 * jacobian, directions)
         np.testing.assert_allclose(widths, 0.5, rtol=1e-6)
+
+
+def test_a_film_costs_alone_what_it_costs_among_others() -> None:
+    # profiles compare the chi-square of the optimum, computed alone, with those of several points
+    record = record_of(PLAIN, thesis_drive(rate=200.0))
+    problem, x, _ = posed(PLAIN, record)
+    means = coarse_problem(problem, corrected=True, rate=25.0)
+    others = x * (1.0 + 1e-3 * np.arange(1, 5)[:, None])
+    alone, among = means.costs(x[None])[0], means.costs(np.vstack([x, others]))[0]
+    assert abs(among - alone) * means.samples < 0.01
