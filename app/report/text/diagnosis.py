@@ -206,9 +206,7 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
             f"{listed(left)}."
         )
         yield from undetermined_texts(outcome)
-    elif outcome.verdict == NOTHING_MISSING and any(
-        c.over_noise(outcome.noise) > TOLERANCE for c in outcome.after.validation
-    ):
+    elif outcome.verdict == NOTHING_MISSING and _validation_is_above_noise(outcome):
         yield (
             "A validation recording keeps more than its noise; the uncertainty of the fitted "
             "parameters is large enough to explain it."
@@ -235,6 +233,10 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
             f"The readings of {moving} move slowly before the voltage. What moves there counts as "
             f"noise, and was not found; effects that are smaller are hidden by it."
         )
+
+
+def _validation_is_above_noise(outcome: DiagnoseOutcome) -> bool:
+    return any(c.over_noise(outcome.noise) > TOLERANCE for c in outcome.after.validation)
 
 
 def _without_own(comparison: Comparison) -> str:
@@ -277,8 +279,9 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
             if finding.rounds
             else f"and what it leaves {_like(outcome)}, so that no effect was tried"
         )
+        which = "the training" if _validation_is_above_noise(outcome) else "these"
         return (
-            f"The thesis model explains these recordings down to the noise"
+            f"The thesis model explains {which} recordings down to the noise"
             f"{_film_tolerance(outcome) or ','} {tried}."
         )
     if judgement.verdict == "explained":

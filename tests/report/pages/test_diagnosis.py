@@ -211,6 +211,15 @@ class TestHeadline:
             assert diagnosis_json(outcome)["verdict_reasons"] == ["validation"]
         assert left("explained", 1.14, steps=(SURE,)).verdict == "explained"
 
+    def test_what_the_error_of_the_parameters_explains_is_said_of_training_alone(self):
+        outcome = left("nothing_missing", 2.7, steps=())
+        own = tuple(4.0 * c.noise for c in outcome.after.validation)
+        outcome = replace(outcome, prediction_errors=own)
+        assert outcome.verdict == "nothing_missing"
+        told = " ".join(summary(outcome))
+        assert "the uncertainty of the fitted parameters is large enough to explain it" in told
+        assert "explains the training recordings down to the noise" in told
+
     def test_what_moves_before_the_voltage_is_not_called_nothing(self):
         still = left("nothing_missing", 1.0, steps=())
         assert still.verdict == "nothing_missing"
