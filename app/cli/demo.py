@@ -29,8 +29,8 @@ from dearig.report.pages.html import write_demo_report
 
 __all__ = ["HIDDEN", "DemoResult", "run_demo"]
 
-#: A simulated rig with a hidden effect, which the diagnosis is not told: a leakage that the
-#: displacement alone takes for a fault of the amplifier. Monitor and current tell them apart.
+#: Address of the simulated rig that is diagnosed. It hides a leakage: by the displacement alone
+#: that looks like a fault of the amplifier, by the recorded voltage and current it does not.
 HIDDEN = "sim:12"
 
 

@@ -318,7 +318,7 @@ class Problem:
         # in quick steps a film alone ends elsewhere than in a pack, and costs are compared
         if fidelity == kernel.COARSE and self._in_packs(c[0]):
             others = WIDTH - len(films)
-            c = np.vstack([c, np.repeat(c[:1], max(others, 0), axis=0)])
+            c = np.vstack([c, np.repeat(c[:1], others, axis=0)])
             films = [*films, *([members + i] for i in range(others))]
         moved, statuses, steps = readings_of(
             c, self._length, drive, record.lag, fidelity, record.time, films

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -121,35 +121,35 @@ def content_of(
     progress("finding quantities", 0.9)
     tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
     scales = raw or {}
+    was, _ = exported_from(source)
+    apart = {*was.channels, *was.computed}  # of an exported recording: no quantities of an import
     # without tables, and where several columns of several make up a recording
-    proposals = {"": _proposal(source, None, scales, numbers)}
+    proposals = {"": _proposal(source, None, scales, numbers, apart)}
     for name in list(tables)[:PROPOSED_MAX]:
-        proposals[printable(name)] = _proposal(source, name, scales, numbers)
+        proposals[printable(name)] = _proposal(source, name, scales, numbers, apart)
     block: Sequence[Sequence[str]] = getattr(source, "block", ())
     return Content(
-        path, columns, proposals, _taken(source, scales),
+        path, columns, proposals, _taken(source, scales, apart),
         is_text=hasattr(source, "layout"), told=specimen_from_header(block),
         block=tuple(printable(" ".join(row)) for row in block if row),
     )  # fmt: skip
 
 
-def _taken(source: Source, raw: Mapping[str, UnitScale]) -> str | None:
+def _taken(source: Source, raw: Mapping[str, UnitScale], apart: Collection[str]) -> str | None:
     """Return the table that is taken without being asked, "" for all columns; else None."""
     try:
-        chosen = choose(source, {}, raw, timed=False, apart=_apart(source))
+        chosen = choose(source, {}, raw, timed=False, apart=apart)
     except InputError:
         return ""
     return None if chosen.table_choices else printable(chosen.table or "")
 
 
-def _apart(source: Source) -> set[str]:
-    """Return the columns of an exported recording that are no quantities of an import."""
-    was, _ = exported_from(source)
-    return {*was.channels, *was.computed}
-
-
 def _proposal(
-    source: Source, table: str | None, raw: Mapping[str, UnitScale], numbers: Mapping[str, int]
+    source: Source,
+    table: str | None,
+    raw: Mapping[str, UnitScale],
+    numbers: Mapping[str, int],
+    apart: Collection[str],
 ) -> ColumnGuesses:
     tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
     names = list(source.names if table is None else tables[table])
@@ -157,7 +157,7 @@ def _proposal(
     places = tuple(numbers[printable(name)] for name in names if printable(name) in numbers)
     digest = _signature(source, names)
     try:
-        chosen = choose(of_table, {}, raw, timed=False, apart=_apart(source))
+        chosen = choose(of_table, {}, raw, timed=False, apart=apart)
     except InputError as error:
         return ColumnGuesses({}, places, digest, (str(error),))
     if chosen.table is not None:  # the columns of a table are proposed with that table
