@@ -116,7 +116,7 @@ class RecordingsTable(QTableView):
         # by ranges of rows: Qt's list of selected rows asks the model for each cell of each row
         rows = {
             row
-            for part in self.selectionModel().selection()
+            for part in self.selectionModel().selection().toList()
             for row in range(part.top(), part.bottom() + 1)
         }
         return [self._files.path_at(row) for row in sorted(rows)]
