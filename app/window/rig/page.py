@@ -36,6 +36,7 @@ from dearig.units import readable
 from dearig.window.documents.file_actions import FileActions
 from dearig.window.jobs.background import Background
 from dearig.window.kit.fields import form_fields, in_words
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.form import Form
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
@@ -342,7 +343,7 @@ class RigPage(Page):
         left.addWidget(self._make_check_card(), 1)
         outer.addLayout(left, 10)
         self.editor = self._make_editor_card()
-        outer.addWidget(self.editor, 11)  # all its tabs are seen at 1366 px
+        outer.addWidget(self.editor, 14)  # all its tabs are seen at 1366 px
 
     def _make_address_card(self) -> QWidget:
         grid = QGridLayout()
@@ -426,9 +427,8 @@ class RigPage(Page):
 
     def _make_editor_card(self) -> QWidget:
         column = QVBoxLayout()
-        row = QHBoxLayout()
-        row.addWidget(label("Rig file", "heading"))
-        row.addWidget(self.files.name, 1)
+        row = Flow()
+        row.add(label("Rig file", "heading"), self.files.name, share=1)
         open_button = button("&Open …", "Read a rig file; files can be dropped here (Ctrl+Shift+O)")
         open_button.setShortcut(QKeySequence("Ctrl+Shift+O"))
         open_button.clicked.connect(self.files.ask_open)
@@ -443,7 +443,7 @@ class RigPage(Page):
         defaults = button("&Thesis rig", "Use the rig file of the thesis")
         defaults.clicked.connect(self._ask_defaults)
         for made in (open_button, self.save_button, self.save_as_button, defaults):
-            row.addWidget(made)
+            row.add(made)
         column.addLayout(row)
         column.addWidget(self.files.trouble)
         self.state = Message()
@@ -467,7 +467,7 @@ class RigPage(Page):
             values = section_values(self.text, table)
             form = Form(form_fields(SECTIONS[table]), values, explain=True)
             form.changed.connect(lambda key, value: self.set_value(table, key, value))
-            form.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
+            form.setContentsMargins(SPACE // 2, SPACE, SPACE // 2, SPACE)
             self._areas[table].setWidget(form)
             self.forms[table] = form
         return self.forms[table]

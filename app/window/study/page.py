@@ -32,6 +32,7 @@ from dearig.window.jobs.background import Background
 from dearig.window.jobs.job_controls import JobControls, splitter
 from dearig.window.jobs.worker import Worker
 from dearig.window.kit.browser import open_in_browser
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.turns import Turns
@@ -184,10 +185,9 @@ class StudyPage(Page):
         top = QHBoxLayout()
         top.addWidget(self.headline, 1)
         top.addWidget(self.reopen_button, 0, Qt.AlignmentFlag.AlignTop)
-        tools = QHBoxLayout()
+        tools = Flow()
         for made in (self.overlay_button, self.save_button, self.report_button, self.run_button):
-            tools.addWidget(made)
-        tools.addStretch(1)
+            tools.add(made)
 
         self.verdict = ReportPage()
         self.curves = BeforeAfterPlot(self._session)
