@@ -66,6 +66,7 @@ class RigPage(Page):
         self.text = session.rig_text
         self._in_force = session.rig_text  # the last text without faults
         self._typing = False  # a name or server is typed, and not taken
+        self._saved_meanwhile = False  # while a run went on
         self.forms: dict[str, Form] = {}  # made when their tab is first shown
         self._areas: dict[str, QScrollArea] = {}
         self.file = EditedFile("rig file", session.rig_text, session.rig_path)
@@ -105,6 +106,8 @@ class RigPage(Page):
         self.device.setEnabled(kind in ("local", "remote"))
         self.server.setEnabled(kind == "remote")
         self.session.set_address(address)
+        if self.session.address != address:  # a run goes on
+            self._show_address()
         self._block_address()
 
     @Slot()
@@ -169,6 +172,8 @@ class RigPage(Page):
         for part in (self.address_card, self.editor):
             part.setEnabled(not running)
         self.check_button.setEnabled(not running and not self._checks.busy)
+        if self._saved_meanwhile:
+            self._saved()
 
     @Slot()
     def _rig_changed(self) -> None:
@@ -205,9 +210,17 @@ class RigPage(Page):
 
     @Slot()
     def _saved(self) -> None:
-        self._take(self.text, self.file)  # the path may be another one
+        self._saved_meanwhile = self.session.running
+        if not self._saved_meanwhile:
+            self._take(self.text, self.file)  # the path may be another one
 
     def _take(self, text: str, file: EditedFile) -> None:
+        if self.session.running:  # it was read meanwhile, or is dropped
+            self.files.trouble.show_text(
+                "A run goes on: the rig file in force stays. Open the other one after it."
+            )
+            self._show_all()
+            return
         try:
             faults = faults_of(text)
         except InputError as error:
