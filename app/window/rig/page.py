@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QRadioButton,
     QScrollArea,
-    QSpinBox,
     QTableWidget,
     QTableWidgetItem,
     QTabWidget,
@@ -38,6 +37,7 @@ from dearig.window.jobs.background import Background
 from dearig.window.kit.fields import form_fields, in_words
 from dearig.window.kit.flow import Flow
 from dearig.window.kit.form import Form
+from dearig.window.kit.number_box import WholeBox
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
 from dearig.window.rig.live_inputs import LiveInputs
@@ -362,9 +362,7 @@ class RigPage(Page):
         grid = QGridLayout()
         grid.addWidget(label("Rig", "heading"), 0, 0, 1, 3)
         self.kinds = QButtonGroup(self)
-        self.seed = QSpinBox()
-        self.seed.setRange(0, 999_999)
-        self.seed.setValue(7)
+        self.seed = WholeBox(0, 999_999, 7)
         self.seed.setMinimumHeight(24)  # as high as its neighbours
         self.seed.setToolTip("Each seed is another film: with another hidden effect, or with none")
         self.device = QLineEdit(self.session.rig_file.card.device)

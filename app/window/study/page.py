@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QMenu,
     QRadioButton,
-    QSpinBox,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -33,6 +32,7 @@ from dearig.window.jobs.job_controls import JobControls, splitter
 from dearig.window.jobs.worker import Worker
 from dearig.window.kit.browser import open_in_browser
 from dearig.window.kit.flow import Flow
+from dearig.window.kit.number_box import WholeBox
 from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.turns import Turns
@@ -111,7 +111,7 @@ class StudyPage(Page):
         both.addButton(self.diagnose)
         both.addButton(self.identify)
         self.diagnose.toggled.connect(self._kind_changed)
-        self.branches = QSpinBox(minimum=1, maximum=BRANCHES_MAX, value=3)
+        self.branches = WholeBox(1, BRANCHES_MAX, 3)
         self.branches.setToolTip("Number of Maxwell relaxation branches")
         self.spring = QComboBox()
         self.spring.addItems(_SPRINGS)
