@@ -292,13 +292,7 @@ class RecordingsPage(Page):
         self._reading.clear()
         self._read.clear()
         self._wanted = chosen[:_TOGETHER_MAX]
-        if len(chosen) > _TOGETHER_MAX:
-            self.message.show_text(
-                f"{len(chosen)} recordings are selected; the first {_TOGETHER_MAX} are plotted",
-                "warn",
-            )
-        else:
-            self.message.show_text("")
+        self.message.show_text("")
         readable = [path for path in self._wanted if not self._trouble(path)]
         for words in filter(None, map(self._trouble, self._wanted)):
             self.message.show_text(words)
@@ -576,6 +570,9 @@ class RecordingsPage(Page):
                 words = f"{shown} of {words}"
             if self._library.left:
                 words += f", {self._library.left} to read"
+            selected = len(self.chosen())
+            if selected > _TOGETHER_MAX:
+                words += f", {selected} selected ({_TOGETHER_MAX} are plotted)"
             words += ", reading curves …" * any(p not in self._read for p in self._wanted)
         self.count.show_text(words)
 

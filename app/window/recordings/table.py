@@ -113,8 +113,13 @@ class RecordingsTable(QTableView):
     @property
     def chosen(self) -> list[Path]:
         """The selected recordings, in the order of the table."""
-        rows = sorted(self.selectionModel().selectedRows(), key=QModelIndex.row)
-        return [self._files.path_at(row.row()) for row in rows]
+        # by ranges of rows: Qt's list of selected rows asks the model for each cell of each row
+        rows = {
+            row
+            for part in self.selectionModel().selection().toList()
+            for row in range(part.top(), part.bottom() + 1)
+        }
+        return [self._files.path_at(row) for row in sorted(rows)]
 
     def choose(self, paths: Iterable[Path]) -> None:
         """Select the rows of ``paths``."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TypeVar, cast
@@ -13,6 +15,7 @@ from PySide6.QtGui import (
     QGuiApplication,
     QKeySequence,
     QMoveEvent,
+    QResizeEvent,
     QShowEvent,
 )
 from PySide6.QtWidgets import (
@@ -79,6 +82,7 @@ class MainWindow(QMainWindow):
         self.compilation = Compilation(self)
         self.library = shared_library(session)  # lists the folder while the window is made
         self._pages: dict[type[Page], Page] = {}
+        self._drawn: set[type[Page]] = set()
         self._turns, self._drawing = (Turns(lambda: session.busy, self) for _ in range(2))
         self._make_list()
         self.run_page = self.page(RunPage)
@@ -113,12 +117,20 @@ class MainWindow(QMainWindow):
         return cast(P, self._pages[kind])
 
     def _make_next_page(self) -> bool:
-        """Make a page, or the guide, that has not been needed yet; return False once all are."""
-        kind = next((kind for kind in PAGES if kind not in self._pages), None)
+        """Make a page, or the guide, that was not shown yet; return False once all are.
+
+        It is drawn too: Qt lays a page out, and applies the style sheet to each of its parts, when
+        it is drawn for the first time.
+        """
+        kind = next((kind for kind in PAGES if kind not in self._drawn), None)
         if kind is not None:
-            self.page(kind)
+            page = self.page(kind)
+            self._drawn.add(kind)
+            page.resize(self.stack.size())
+            page.grab()
         elif self._guide is None:
             self._guide = Guide(self)
+            self._guide.grab()
         else:
             return False
         return True
@@ -185,6 +197,10 @@ class MainWindow(QMainWindow):
         QTimer.singleShot(0, self._fit_screen)
         # a window manager adds its frame, and moves the window for it, soon after that
         QTimer.singleShot(_SETTLING, self._settled)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        with self._drawn_in_turns(self.stack):
+            super().resizeEvent(event)
 
     def moveEvent(self, event: QMoveEvent) -> None:  # noqa: N802
         super().moveEvent(event)
@@ -387,14 +403,20 @@ class MainWindow(QMainWindow):
     @Slot(int)
     def _page_changed(self, row: int) -> None:
         page = self.page(PAGES[row])
-        # what takes long to draw is drawn in turns of its own while the rig is busy
+        self._drawn.add(PAGES[row])
+        with self._drawn_in_turns(page):
+            self.stack.setCurrentWidget(page)
+        self.session.settings.setValue("page", row)
+
+    @contextmanager
+    def _drawn_in_turns(self, page: QWidget) -> Iterator[None]:
+        """Draw each part of ``page`` that takes long in a turn of its own while the rig is busy."""
         self._drawing.finish()
         parts = page.findChildren(QAbstractScrollArea)
         for part in (page, *parts) if self.session.busy else ():
             part.setUpdatesEnabled(False)
-        self.stack.setCurrentWidget(page)
+        yield
         self._drawing.add(partial(part.setUpdatesEnabled, True) for part in (page, *parts))
-        self.session.settings.setValue("page", row)
 
     @Slot(Path)
     def _show_recording(self, path: Path) -> None:
