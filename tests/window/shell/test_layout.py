@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 from PySide6.QtCore import QPoint, QRect
@@ -40,10 +40,12 @@ PATIENCE = 120_000
 LOOKS = 20
 
 
-def wrong(window: MainWindow, qtbot: QtBot, state: str) -> list[str]:
+def wrong(
+    window: MainWindow, qtbot: QtBot, state: str, sizes: Sequence[tuple[int, int]] = SIZES
+) -> list[str]:
     """Return what is wrong at each size once what is computed and laid out later has arrived."""
     found = []
-    for width, height in SIZES:
+    for width, height in sizes:
         window.resize(width, height)
         for _ in range(LOOKS):
             qtbot.wait(20)
@@ -87,7 +89,7 @@ def test_nothing_is_cut_or_covered_on_any_page_at_three_sizes(
     status.run_ended(LatchedAlarm("Stopped by an interlock", LONG, time.time(), "sim"))
     for page in window.pages:
         window.show_page(page)
-        found += wrong(window, qtbot, f"{page.title} with an alarm")
+        found += wrong(window, qtbot, f"{page.title} with an alarm", SIZES[-1:])
     status.run_ended(None)
     window.session.unblock("test")
     plan_of(SHORT)
