@@ -66,6 +66,7 @@ from dearig.window.shell.pages import PAGES
 __all__ = ["MainWindow"]
 
 _COLOUR_SCHEMES = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
+_LIST = 116  # px, width of the list of pages
 _SETTLING = 1000  # ms after the window is shown in which a window manager gives it its frame
 P = TypeVar("P", bound=Page)
 
@@ -285,7 +286,7 @@ class MainWindow(QMainWindow):
     def _make_list(self) -> None:
         self.list = QListWidget()
         self.list.setObjectName("pages")
-        self.list.setFixedWidth(132)
+        self.list.setFixedWidth(_LIST)
         self.list.setAccessibleName("Pages")
         self.stack = _Stack()
         for place, kind in enumerate(PAGES):
@@ -360,7 +361,7 @@ class MainWindow(QMainWindow):
         made.setToolTip("Guide (F1), colour scheme, layout, errors of the program")
         made.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         made.setMenu(menu)
-        made.setFixedWidth(132)
+        made.setFixedWidth(_LIST)
         made.setMinimumHeight(32)
         return made
 
@@ -416,7 +417,11 @@ class MainWindow(QMainWindow):
         for part in (page, *parts) if self.session.busy else ():
             part.setUpdatesEnabled(False)
         yield
-        self._drawing.add(partial(part.setUpdatesEnabled, True) for part in (page, *parts))
+        # what is in view first: until it is drawn, there is what was there before
+        self._drawing.add(
+            partial(part.setUpdatesEnabled, True)
+            for part in (page, *sorted(parts, key=lambda part: not part.isVisible()))
+        )
 
     @Slot(Path)
     def _show_recording(self, path: Path) -> None:
@@ -506,6 +511,14 @@ class _Stack(QStackedWidget):
     def minimumSizeHint(self) -> QSize:  # noqa: N802
         shown = self.currentWidget()
         return super().minimumSizeHint() if shown is None else shown.minimumSizeHint()
+
+    def heightForWidth(self, width: int) -> int:  # noqa: N802
+        """Return what the page needs at least; Qt would return what it likes to have."""
+        shown = self.currentWidget()
+        layout = None if shown is None else shown.layout()
+        if layout is None or not layout.hasHeightForWidth():
+            return self.minimumSizeHint().height()
+        return layout.totalMinimumHeightForWidth(width)
 
 
 def _scrollable(pages: QWidget) -> QScrollArea:

@@ -23,7 +23,14 @@ from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
 from tests.window.conftest import SHORT, press
 from tests.window.made_recordings import made
-from tests.window.shown_text import commands, cut_off, overlapping, stretched
+from tests.window.shown_text import (
+    commands,
+    cut_off,
+    overlapping,
+    sideways,
+    squashed,
+    stretched,
+)
 
 #: The screen of a small notebook, a large one, and the small one at a scale of 1.5 without the
 #: frame of a window.
@@ -49,6 +56,8 @@ def wrong(
                     ("covered", overlapping),
                     ("command", commands),
                     ("stretched", stretched),
+                    ("scrolls", sideways),
+                    ("squashed", squashed),
                 )
                 for text in look(window)
             ]
@@ -72,6 +81,10 @@ def test_nothing_is_cut_or_covered_on_any_page_at_three_sizes(
     rig.live.start()
     qtbot.waitUntil(lambda: rig.live.table.rowCount() > 0, timeout=PATIENCE)
     found += wrong(window, qtbot, "Rig, live values")
+    follow = window.page(FollowPage)
+    window.show_page(follow)
+    follow.modes.setCurrentWidget(follow.hold)
+    found += wrong(window, qtbot, "Follow, hold")
     window.session.block("test", f"rig file: {LONG}", "Rig")
     status.run_ended(LatchedAlarm("Stopped by an interlock", LONG, time.time(), "sim"))
     for page in window.pages:
