@@ -121,7 +121,7 @@ def test_a_reader_who_leaves_a_pipe_is_no_error(lobe: Path) -> None:
     # big enough for no buffer, so that the pipe breaks while it is written to
     read, wrote = os.pipe()
     os.close(read)
-    for arguments in (["presets"], ["info", str(lobe)], ["info", str(lobe), "--json", "-"]):
+    for arguments in (["info", str(lobe)], ["info", str(lobe), "--json", "-"]):
         ended = subprocess.run(
             [sys.executable, "-u", "-c", COMMAND, *arguments],
             stdout=wrote, stderr=subprocess.PIPE, text=True, cwd=ROOT, check=False, timeout=200,

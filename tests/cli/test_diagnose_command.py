@@ -16,7 +16,7 @@ from dearig.config.modelfile import load_model, save_model
 from dearig.config.sequencefile import parse_sequence
 from dearig.errors import DiskFault, InstrumentFault, Interrupted, NotSafe, SafetyStop
 from dearig.model.diagnosis.results import Diagnosis
-from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network, Spring
+from dearig.model.film.material import Network, Spring
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 from dearig.recording import open_recording
@@ -34,11 +34,12 @@ from tests.tools.command import (
     write,
 )
 from tests.tools.diagnosis import LAGGED, RIVAL, STEP, finding, stage
+from tests.tools.engine import PLAIN, effect
 from tests.tools.reports import ESTIMATES
 
 RIG = "[card]\nsample_rate_Hz = 50.0\n"
 #: What the simulated rig of these tests hides.
-HIDDEN = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, (("amplifier offset", (("offset", 60.0),)),))
+HIDDEN = replace(PLAIN, effects=effect("amplifier offset", offset=60.0))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -54,12 +55,16 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bench")
     rig = write(folder / "rig.toml", RIG)
     save_model(folder / "hidden.toml", "hidden", HIDDEN, {})
+    save_model(folder / "plain.toml", "plain", PLAIN, {})
     for i, preset in enumerate(("thesis", "validation-a-0.6", "validation-b-7.0")):
         done(
             "record", preset, "--model", folder / "hidden.toml", "--rig-file", rig,
             "--out", folder / f"{preset}.h5", "--seed", i,
         )  # fmt: skip
-    done("record", "thesis", "--rig-file", rig, "--out", folder / "clean.h5", "--seed", 9)
+    done(
+        "record", "thesis", "--model", folder / "plain.toml", "--rig-file", rig,
+        "--out", folder / "clean.h5", "--seed", 9,
+    )  # fmt: skip
     return folder
 
 
@@ -95,7 +100,8 @@ def diagnosed(bench: Path) -> dict:
     """What the command makes of the rig that has an offset; the search is the real one."""
     return done(
         "diagnose", bench / "thesis.h5", "--validate", bench / "validation-a-0.6.h5",
-        "--validate", bench / "validation-b-7.0.h5", "--model-out", bench / "better.toml",
+        "--validate", bench / "validation-b-7.0.h5", "--branches", "1",
+        "--model-out", bench / "better.toml",
         "--report", bench / "report.html", "--json", "-",
     ).json  # fmt: skip
 
@@ -177,7 +183,9 @@ class TestSearch:
     @pytest.mark.slow
     def test_where_nothing_is_missing_it_says_so(self, bench, tmp_path):
         out = tmp_path / "m.toml"
-        found = done("diagnose", bench / "clean.h5", "--model-out", out, "--json", "-").json
+        found = done(
+            "diagnose", bench / "clean.h5", "--branches", "1", "--model-out", out, "--json", "-"
+        ).json
         assert found["verdict"] == "nothing_missing"
         assert found["steps"] == []
         assert found["final"]["validation"] is None

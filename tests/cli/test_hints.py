@@ -63,7 +63,8 @@ def hinted(keyword: str, folder: Path = ROOT) -> set[str]:
         constant.value
         for path in modules()
         if path.is_relative_to(folder)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        and f"{keyword}=" in (text := path.read_text(encoding="utf-8"))
+        for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.keyword) and node.arg == keyword
         for part in (node.value.keys if isinstance(node.value, ast.Dict) else [node.value])
         for constant in itertools.islice(ast.walk(part), 20)

@@ -7,10 +7,10 @@ from xml.sax.saxutils import quoteattr
 import pytest
 from matplotlib.figure import Figure
 
-__all__ = ["pictures"]
+__all__ = ["pictures", "sketched"]
 
 
-def _sketched(figure: Figure, prefix: str, label: str) -> str:
+def sketched(figure: Figure, prefix: str, label: str) -> str:
     """An element as ``svg`` makes it, with the size of ``figure`` and nothing in it."""
     width, height = 72.0 * figure.get_size_inches()
     box = f'viewBox="0 0 {width:g} {height:g}"'
@@ -23,4 +23,4 @@ def pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
     The pages that a module makes once for all of its tests are made before, with their pictures.
     """
-    monkeypatch.setattr("dearig.report.pages.html.svg", _sketched)
+    monkeypatch.setattr("dearig.report.pages.html.svg", sketched)

@@ -26,6 +26,7 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.follow.page import FollowPage
+from dearig.window.jobs.collector import Collector
 from dearig.window.kit.theme import DARK, LIGHT, apply, prepare_plots
 from dearig.window.recordings.page import RecordingsPage
 from dearig.window.rig.page import RigPage
@@ -320,6 +321,8 @@ def main() -> None:
 
     application = QApplication(sys.argv[:1])
     prepare_plots()
+    # as in the program: a collection at any time may end an object while Qt holds a lock of it
+    collector = Collector(application)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "recordings"
         folder.mkdir()
@@ -349,6 +352,7 @@ def main() -> None:
         window.leave()
         until(lambda: not window.isVisible(), "the end of the last run")
         end(window)
+    collector.close()
     application.quit()
 
 

@@ -28,7 +28,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.widgets import Message
+from dearig.window.plots.canvas import Canvas
 
 __all__ = [
     "commands",
@@ -36,6 +38,8 @@ __all__ = [
     "overlapping",
     "rendered_markup",
     "shown_texts",
+    "sideways",
+    "squashed",
     "stretched",
     "unreadable",
 ]
@@ -48,6 +52,7 @@ _RAW = re.compile(
 _COMMAND = re.compile(
     r"(?<![\w-])--[a-z][a-z-]+|\bdearig [a-z]+(?:-[a-z]+)*\b|\bctrl-C\b|\bexit code\b"
 )
+_NUMBER = 12  # px, height of a number of an axis
 _ROWS = 400  # rows of a table that are looked at
 
 
@@ -179,6 +184,29 @@ def stretched(window: QWidget) -> list[str]:
         if message.isVisible()
         and message.height()
         > message.heightForWidth(message.width()) + message.fontMetrics().lineSpacing()
+    ]
+
+
+def sideways(window: QWidget) -> list[str]:
+    """Return the pages and forms that scroll sideways; a report's wide tables may."""
+    lay_out()
+    return [
+        f"{type(area.widget()).__name__} by {area.horizontalScrollBar().maximum()} px"
+        for area in window.findChildren(QScrollArea)
+        if area.isVisible()
+        and not isinstance(area, ReportPage)
+        and area.horizontalScrollBar().maximum() > 0
+    ]
+
+
+def squashed(window: QWidget) -> list[str]:
+    """Return the plots that are lower than three of their numbers."""
+    return [
+        f"{canvas.accessibleName()}: {plot.vb.height():.0f} px"
+        for canvas in window.findChildren(Canvas)
+        if canvas.isVisible()
+        for plot in canvas.area_plots
+        if plot.isVisible() and plot.vb.height() < 3 * _NUMBER
     ]
 
 

@@ -7,12 +7,10 @@ import math
 from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QGridLayout,
     QHBoxLayout,
     QLineEdit,
     QProgressBar,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
@@ -20,6 +18,7 @@ from PySide6.QtWidgets import (
 from dearig.batch.campaign import Arming
 from dearig.config.campaignfile import RUNS_MAX
 from dearig.window.high_voltage.status import HighVoltageStatus
+from dearig.window.kit.number_box import NumberBox, WholeBox
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import ElidedLabel, Message, Readout, button, card, label
 from dearig.window.run.controls import StepButton
@@ -130,10 +129,10 @@ class CampaignControls(QWidget):
         self.operator = QLineEdit()
         self.operator.setMinimumWidth(90)
         self.operator.setToolTip("Name of the person who arms; kept in journal and recordings")
-        self.runs = QSpinBox(minimum=1, maximum=RUNS_MAX)
+        self.runs = WholeBox(1, RUNS_MAX, 1)
         self.runs.setToolTip("Number of runs that are armed")
-        self.hours = QDoubleSpinBox(minimum=_STEP, maximum=_HOURS_MAX, decimals=1, singleStep=_STEP)
-        self.hours.setSuffix(" h")
+        self.hours = NumberBox(_STEP, _HOURS_MAX, _STEP, decimals=1, unit=" h")
+        self.hours.setSingleStep(_STEP)
         self.hours.setToolTip("Time from now on; no run starts that would end later")
         self.paced = QCheckBox("Real t&ime")
         self.paced.setToolTip(

@@ -43,7 +43,7 @@ __all__ = ["SequenceEditor"]
 _COLUMNS = ("", "Kind", "Settings", "Duration (s)")
 _DURATION = 3  # column
 _FOREGROUND = Qt.ItemDataRole.ForegroundRole
-_LEAST_WIDTH = 430  # px
+_LEAST_WIDTH = 325  # px
 _HEADS = {key: form_field(key, info) for key, info in HEAD_FIELDS.items()}
 
 
@@ -180,6 +180,7 @@ class SequenceEditor(QWidget):
             read = field.text() if key == "name" else read_typed(_HEADS[key], field.text()).value
             if read != value:
                 field.setText(shown_value(value))
+                field.setCursorPosition(0)  # its beginning is seen
                 self._misread.pop(key, None)
                 if key in self._edited_heads:
                     self._edited_heads.remove(key)

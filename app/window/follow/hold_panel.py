@@ -11,7 +11,6 @@ import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal, Slot
 from PySide6.QtWidgets import (
     QComboBox,
-    QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
     QVBoxLayout,
@@ -34,6 +33,7 @@ from dearig.window.follow.model_choice import ModelChoice
 from dearig.window.jobs.job_controls import JobControls, result_side, splitter
 from dearig.window.jobs.worker import Job, Worker
 from dearig.window.kit.browser import open_in_browser
+from dearig.window.kit.number_box import NumberBox
 from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label
@@ -311,12 +311,10 @@ class HoldPanel(QWidget):
     # layout
 
     def _make_inputs(self) -> QWidget:
-        self.displacement = QDoubleSpinBox(
-            minimum=0.001, maximum=1000.0, decimals=3, singleStep=0.05, value=0.5
-        )
-        self.displacement.setSuffix(" mm")
+        self.displacement = NumberBox(0.001, 1000.0, 0.5, decimals=3, unit=" mm")
+        self.displacement.setSingleStep(0.05)
         self.displacement.setToolTip("Displacement from the loaded rest state")
-        self.duration = QDoubleSpinBox(minimum=0.01, maximum=1e6, decimals=2, value=60.0)
+        self.duration = NumberBox(0.01, 1e6, 60.0, decimals=2)
         self.duration.setToolTip("Time for which it is held, without rise and fall")
         self.unit = QComboBox()
         for name, factor in _UNITS:
@@ -332,11 +330,10 @@ class HoldPanel(QWidget):
         caption.setBuddy(self.duration)
         form.addRow(caption, lasting)
         form.addRow("&Model", self.model)
-        self.options: dict[str, QDoubleSpinBox] = {}
+        self.options: dict[str, NumberBox] = {}
         for name, words, low, high, decimals, unit, factor, tip in _OPTIONS:
-            field = QDoubleSpinBox(minimum=low, maximum=high, decimals=decimals)
-            field.setValue(getattr(HoldOptions(), name) / factor)
-            field.setSuffix(unit)
+            value = getattr(HoldOptions(), name) / factor
+            field = NumberBox(low, high, value, decimals=decimals, unit=unit)
             field.setToolTip(tip)
             field.valueChanged.connect(self._refresh)
             form.addRow(words, field)

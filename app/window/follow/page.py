@@ -14,7 +14,6 @@ from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
-    QDoubleSpinBox,
     QFormLayout,
     QTabWidget,
     QVBoxLayout,
@@ -47,6 +46,7 @@ from dearig.window.follow.target import TargetEditor
 from dearig.window.jobs.job_controls import JobControls, result_side, splitter
 from dearig.window.jobs.worker import Job, Worker
 from dearig.window.kit.browser import open_in_browser
+from dearig.window.kit.number_box import NumberBox
 from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.report_table import ReportTable
 from dearig.window.kit.theme import SPACE
@@ -392,9 +392,7 @@ class FollowPage(Page):
         session = self._session
         self.target = TargetEditor(session)
         self.model = ModelChoice(session)
-        self.within = QDoubleSpinBox(minimum=0.1, maximum=_WITHIN_MAX, decimals=1)
-        self.within.setValue(WITHIN * 1e6)
-        self.within.setSuffix(" \N{MICRO SIGN}m")
+        self.within = NumberBox(0.1, _WITHIN_MAX, WITHIN * 1e6, decimals=1, unit=" \N{MICRO SIGN}m")
         self.within.setToolTip("Distance from the target that is accepted")
         self.nearest = QCheckBox("Follow the &nearest feasible target")
         self.nearest.setToolTip(

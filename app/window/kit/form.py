@@ -6,13 +6,17 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from PySide6.QtCore import Signal, Slot
-from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QLineEdit, QWidget
 
 from dearig.window.kit.fields import FormField, in_words, read_back, read_typed, shown_value
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, label, set_wrong
 
 __all__ = ["Form"]
+
+_ABOUT = 100  # px, least width of a description
+_CAPTION = 28  # letters; a longer one is wrapped, so that the form fits a small screen
 
 
 class Form(QWidget):
@@ -34,6 +38,7 @@ class Form(QWidget):
     ) -> None:
         super().__init__(parent)
         self._fields = {field.key: field for field in fields}
+        self._about: list[QLabel] = []  # beside the fields, where there is room
         self._widgets: dict[str, QLineEdit | QComboBox] = {}
         self._below: dict[str, Message] = {}
         self._faults: dict[str, str] = {}  # found by the check of the file
@@ -48,21 +53,40 @@ class Form(QWidget):
             widget = self._widget(field, values.get(key))
             caption = label(field.label, tip=field.tip)
             caption.setBuddy(widget)
+            caption.setWordWrap(len(field.label) > _CAPTION)
             grid.addWidget(caption, row, 0)
             grid.addWidget(widget, row, 1)
             grid.addWidget(label(field.unit, "muted"), row, 2)
             if explain:
                 about = label(in_words(field.description), "muted", field.tip)
                 about.setWordWrap(True)
+                about.setMinimumWidth(1)  # not that of its longest word
+                self._about.append(about)
                 grid.addWidget(about, row, 3)
             below = Message()
             grid.addWidget(below, row + 1, 1, 1, 3)
             self._below[key] = below
             self._widgets[key] = widget
             self._show_below(key)
+        self._grid = grid
         grid.setColumnStretch(1, 4)
         grid.setColumnStretch(3, 4 if explain else 0)
         grid.setRowStretch(2 * len(self._fields), 1)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Leave out the descriptions, which are in the tips too, where there is no room."""
+        super().resizeEvent(event)
+        others = sum(
+            max(self._item_width(row, column) for row in range(0, 2 * len(self._fields), 2))
+            for column in range(3)
+        )
+        room = self.width() - others - 3 * SPACE >= _ABOUT
+        for about in self._about:
+            about.setVisible(room)
+
+    def _item_width(self, row: int, column: int) -> int:
+        item = self._grid.itemAtPosition(row, column)
+        return 0 if item is None else item.sizeHint().width()
 
     def show_faults(self, faults: Mapping[str, str]) -> None:
         """Show each fault below its field, and clear the others."""

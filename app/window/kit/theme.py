@@ -191,7 +191,7 @@ def _sheet(t: Theme) -> str:
         padding: 3px 5px; border: 1px solid {t.line}; border-radius: 4px; background: {t.surface};
         selection-background-color: {t.accent}; selection-color: {t.on_accent};
     }}
-    QLineEdit[wrong="true"] {{ border: 2px solid {t.bad}; }}
+    QLineEdit[wrong="true"], QAbstractSpinBox[wrong="true"] {{ border: 2px solid {t.bad}; }}
     QRadioButton::indicator, QCheckBox::indicator, QAbstractItemView::indicator {{
         width: 12px; height: 12px; border: 1px solid {t.muted}; background: {t.surface};
     }}

@@ -6,6 +6,7 @@ operator finds them in the bar above the plots and in their context menu, with w
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from dearig.recording.files import in_words
 from dearig.window.documents.dialogs import save_as
 from dearig.window.plots import export as plot_export
-from dearig.window.plots.canvas import Canvas, Drag
+from dearig.window.plots.canvas import GAP, Canvas, Drag
 from dearig.window.plots.cursors import CursorGroup
 from dearig.window.plots.plot import Plot
 from dearig.window.plots.tools import PlotTools
@@ -144,7 +145,7 @@ class PlotArea(QWidget):
         bottom: str = "Time (s)",
         group: str = "time",
         weight: int = 1,
-        least: int = 60,
+        least: int = 54,
         rows: int = 1,
         own_range: bool = False,
         dates: bool = False,
@@ -221,10 +222,18 @@ class PlotArea(QWidget):
                 layout.addItem(plot, row, column, len(self._rows_of[plot]), 1)
             elif taken and not plot.isVisible():
                 layout.removeItem(plot)
+        # the numbers and the label of a horizontal axis are not a part of the plot's height
+        axes = dict.fromkeys(self._rows, 0.0)
+        for plot in lowest.values():
+            row = self._rows_of[plot][-1]
+            axes[row] = max(axes[row], plot.getAxis("bottom").minimumHeight())
+        total = GAP * (len(shown) + 1.0)
         for row, (weight, least) in self._rows.items():
+            height = least + axes[row] if row in shown else 0.0
             layout.setRowStretchFactor(row, weight if row in shown else 0)
-            layout.setRowMinimumHeight(row, least if row in shown else 0.0)
-        self.canvas.setMinimumHeight(sum(self._rows[row][1] for row in shown))
+            layout.setRowMinimumHeight(row, height)
+            total += height
+        self.canvas.setMinimumHeight(math.ceil(total))
 
     # ranges
 

@@ -12,7 +12,9 @@ from PySide6.QtWidgets import QRubberBand, QSizePolicy, QWidget
 
 from dearig.window.plots.plot import Plot
 
-__all__ = ["Canvas", "Drag"]
+__all__ = ["GAP", "Canvas", "Drag"]
+
+GAP = 2  #: px between two plots, and around them
 
 _NEAR = 5.0  # px from a cursor within which it is taken
 _ZOOM_LEAST = 5  # px; a shorter drag is a click, and does not zoom
@@ -60,8 +62,8 @@ class Canvas(pg.GraphicsLayoutWidget):
         self.cursors_of: dict[Plot, tuple[float, float] | None] = {}
         self._dragged: _Dragged | None = None
         self._band = QRubberBand(QRubberBand.Shape.Rectangle, self.viewport())
-        self.ci.layout.setVerticalSpacing(2)
-        self.ci.layout.setContentsMargins(2, 2, 6, 2)
+        self.ci.layout.setVerticalSpacing(GAP)
+        self.ci.layout.setContentsMargins(GAP, GAP, 6, GAP)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setMouseTracking(True)

@@ -32,6 +32,7 @@ from dearig.report.text.tables import Row, Table
 from dearig.window.documents.dialogs import choose_file, choose_folder, save_as
 from dearig.window.imports.queue import Imports
 from dearig.window.jobs.worker import Job
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.report_table import ReportTable, two_columns
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import ElidedLabel, Message, button, menu_button, plain_tip
@@ -154,7 +155,7 @@ class RecordingsPage(Page):
         self._session.folder_changed.connect(self._name_folder)
         self._session.overlays_changed.connect(self._list_models)
 
-    def _top_row(self) -> QHBoxLayout:
+    def _top_row(self) -> Flow:
         self.folder_button = button("", "")
         self.folder_button.clicked.connect(self._ask_folder)
         self.import_button = button(
@@ -184,15 +185,14 @@ class RecordingsPage(Page):
         self.subfolders.setToolTip("List the recordings in subfolders too")
         self.subfolders.toggled.connect(self._library.set_deep)
         columns = menu_button("Columns", "Choose the columns of the table", self.table.columns_menu)
-        row = QHBoxLayout()
-        row.addWidget(self.folder_button)
-        row.addWidget(self.import_button)
-        row.addWidget(self.subfolders)
-        row.addWidget(self.filter, 1)
-        row.addWidget(self.count)
-        row.addWidget(columns)
-        row.addWidget(compare_label)
-        row.addWidget(self.model_box)
+        row = Flow()
+        row.add(self.folder_button)
+        row.add(self.import_button)
+        row.add(self.subfolders)
+        row.add(self.filter, share=1)
+        row.add(self.count)
+        row.add(columns)
+        row.add(compare_label, self.model_box)
         return row
 
     def _tools(self) -> QHBoxLayout:
@@ -292,13 +292,7 @@ class RecordingsPage(Page):
         self._reading.clear()
         self._read.clear()
         self._wanted = chosen[:_TOGETHER_MAX]
-        if len(chosen) > _TOGETHER_MAX:
-            self.message.show_text(
-                f"{len(chosen)} recordings are selected; the first {_TOGETHER_MAX} are plotted",
-                "warn",
-            )
-        else:
-            self.message.show_text("")
+        self.message.show_text("")
         readable = [path for path in self._wanted if not self._trouble(path)]
         for words in filter(None, map(self._trouble, self._wanted)):
             self.message.show_text(words)
@@ -576,6 +570,9 @@ class RecordingsPage(Page):
                 words = f"{shown} of {words}"
             if self._library.left:
                 words += f", {self._library.left} to read"
+            selected = len(self.chosen())
+            if selected > _TOGETHER_MAX:
+                words += f", {selected} selected ({_TOGETHER_MAX} are plotted)"
             words += ", reading curves …" * any(p not in self._read for p in self._wanted)
         self.count.show_text(words)
 

@@ -44,6 +44,8 @@ _SHOWN, _WIDTHS, _SORTING = (
     f"{GROUP}/recordings/{name}" for name in ("shown columns", "widths", "sorting")
 )
 _START = "Start"
+_ROW = 32  # px, height of a row
+_ROWS_LEAST = 4  # of which the header and a scroll bar take one
 #: Least width of a column: its sorting sign, and room to take hold of its edge.
 _WIDTH_MIN, _WIDTH_MAX = 40, 1200
 
@@ -88,7 +90,8 @@ class RecordingsTable(QTableView):
         self.setItemDelegateForColumn(ENDED, _SentenceDelegate(self))
         self.verticalHeader().hide()
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        self.verticalHeader().setDefaultSectionSize(32)
+        self.verticalHeader().setDefaultSectionSize(_ROW)
+        self.setMinimumHeight(_ROWS_LEAST * _ROW)
         header = self.horizontalHeader()
         header.setHighlightSections(False)
         # a header asks of each column whether all rows are selected: 0.2 s for 2000 recordings
@@ -113,8 +116,13 @@ class RecordingsTable(QTableView):
     @property
     def chosen(self) -> list[Path]:
         """The selected recordings, in the order of the table."""
-        rows = sorted(self.selectionModel().selectedRows(), key=QModelIndex.row)
-        return [self._files.path_at(row.row()) for row in rows]
+        # by ranges of rows: Qt's list of selected rows asks the model for each cell of each row
+        rows = {
+            row
+            for part in self.selectionModel().selection().toList()
+            for row in range(part.top(), part.bottom() + 1)
+        }
+        return [self._files.path_at(row) for row in sorted(rows)]
 
     def choose(self, paths: Iterable[Path]) -> None:
         """Select the rows of ``paths``."""

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QRadioButton,
     QScrollArea,
-    QSpinBox,
     QTableWidget,
     QTableWidgetItem,
     QTabWidget,
@@ -36,7 +35,9 @@ from dearig.units import readable
 from dearig.window.documents.file_actions import FileActions
 from dearig.window.jobs.background import Background
 from dearig.window.kit.fields import form_fields, in_words
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.form import Form
+from dearig.window.kit.number_box import WholeBox
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
 from dearig.window.rig.live_inputs import LiveInputs
@@ -65,6 +66,7 @@ class RigPage(Page):
         self.text = session.rig_text
         self._in_force = session.rig_text  # the last text without faults
         self._typing = False  # a name or server is typed, and not taken
+        self._saved_meanwhile = False  # while a run went on
         self.forms: dict[str, Form] = {}  # made when their tab is first shown
         self._areas: dict[str, QScrollArea] = {}
         self.file = EditedFile("rig file", session.rig_text, session.rig_path)
@@ -104,6 +106,8 @@ class RigPage(Page):
         self.device.setEnabled(kind in ("local", "remote"))
         self.server.setEnabled(kind == "remote")
         self.session.set_address(address)
+        if self.session.address != address:  # a run goes on
+            self._show_address()
         self._block_address()
 
     @Slot()
@@ -168,6 +172,8 @@ class RigPage(Page):
         for part in (self.address_card, self.editor):
             part.setEnabled(not running)
         self.check_button.setEnabled(not running and not self._checks.busy)
+        if self._saved_meanwhile:
+            self._saved()
 
     @Slot()
     def _rig_changed(self) -> None:
@@ -204,9 +210,17 @@ class RigPage(Page):
 
     @Slot()
     def _saved(self) -> None:
-        self._take(self.text, self.file)  # the path may be another one
+        self._saved_meanwhile = self.session.running
+        if not self._saved_meanwhile:
+            self._take(self.text, self.file)  # the path may be another one
 
     def _take(self, text: str, file: EditedFile) -> None:
+        if self.session.running:  # it was read meanwhile, or is dropped
+            self.files.trouble.show_text(
+                "A run goes on: the rig file in force stays. Open the other one after it."
+            )
+            self._show_all()
+            return
         try:
             faults = faults_of(text)
         except InputError as error:
@@ -342,15 +356,13 @@ class RigPage(Page):
         left.addWidget(self._make_check_card(), 1)
         outer.addLayout(left, 10)
         self.editor = self._make_editor_card()
-        outer.addWidget(self.editor, 11)  # all its tabs are seen at 1366 px
+        outer.addWidget(self.editor, 14)  # all its tabs are seen at 1366 px
 
     def _make_address_card(self) -> QWidget:
         grid = QGridLayout()
         grid.addWidget(label("Rig", "heading"), 0, 0, 1, 3)
         self.kinds = QButtonGroup(self)
-        self.seed = QSpinBox()
-        self.seed.setRange(0, 999_999)
-        self.seed.setValue(7)
+        self.seed = WholeBox(0, 999_999, 7)
         self.seed.setMinimumHeight(24)  # as high as its neighbours
         self.seed.setToolTip("Each seed is another film: with another hidden effect, or with none")
         self.device = QLineEdit(self.session.rig_file.card.device)
@@ -426,9 +438,8 @@ class RigPage(Page):
 
     def _make_editor_card(self) -> QWidget:
         column = QVBoxLayout()
-        row = QHBoxLayout()
-        row.addWidget(label("Rig file", "heading"))
-        row.addWidget(self.files.name, 1)
+        row = Flow()
+        row.add(label("Rig file", "heading"), self.files.name, share=1)
         open_button = button("&Open …", "Read a rig file; files can be dropped here (Ctrl+Shift+O)")
         open_button.setShortcut(QKeySequence("Ctrl+Shift+O"))
         open_button.clicked.connect(self.files.ask_open)
@@ -443,7 +454,7 @@ class RigPage(Page):
         defaults = button("&Thesis rig", "Use the rig file of the thesis")
         defaults.clicked.connect(self._ask_defaults)
         for made in (open_button, self.save_button, self.save_as_button, defaults):
-            row.addWidget(made)
+            row.add(made)
         column.addLayout(row)
         column.addWidget(self.files.trouble)
         self.state = Message()
@@ -467,7 +478,7 @@ class RigPage(Page):
             values = section_values(self.text, table)
             form = Form(form_fields(SECTIONS[table]), values, explain=True)
             form.changed.connect(lambda key, value: self.set_value(table, key, value))
-            form.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
+            form.setContentsMargins(SPACE // 2, SPACE, SPACE // 2, SPACE)
             self._areas[table].setWidget(form)
             self.forms[table] = form
         return self.forms[table]

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, Qt, Slot
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QWidget
 
 from dearig.acquisition.overlay import OverlayModel
 from dearig.config.modelfile import load_actuator, load_model
 from dearig.config.toml_input import read_text
 from dearig.window.documents.dialogs import choose_file
 from dearig.window.jobs.background import Background
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.widgets import Message, label, plain_tip
 from dearig.window.session.state import Session
 
@@ -36,11 +37,9 @@ class OverlayChooser(QWidget):
         self.message = Message()
         self.models = [QComboBox(), QComboBox()]
         self.drive = QComboBox()
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
+        row = Flow(self)
         caption = label("Overlay &models")
         caption.setBuddy(self.models[0])
-        row.addWidget(caption)
         for place, choice in enumerate(self.models):
             choice.setToolTip("Model that runs in step with the data; may be changed at any time")
             choice.setAccessibleName(f"Overlay model {place + 1}")
@@ -49,13 +48,13 @@ class OverlayChooser(QWidget):
             )
             choice.setMinimumContentsLength(12)
             choice.activated.connect(lambda _, place=place: self._chosen(place))
-            row.addWidget(choice, 1)
+            row.add(*(() if place else (caption,)), choice, share=1)
         self.drive.addItem("driven by the command", "command")
         self.drive.addItem("driven by the monitor", "monitor")
         self.drive.setToolTip("Voltage (kV) that drives the models")
         self.drive.setAccessibleName("Drive of the overlay models")
         self.drive.activated.connect(self._drive_changed)
-        row.addWidget(self.drive)
+        row.add(self.drive)
         session.overlays_changed.connect(self.refresh)
         self.refresh()
 

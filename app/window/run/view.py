@@ -168,7 +168,7 @@ class RunView(QWidget):
         self.trips_action.setCheckable(True)
         self.trips_action.setChecked(True)
         self.trips_action.toggled.connect(self._show_trips)
-        return menu_button("Plots shown", "Show or hide each plot", menu)
+        return menu_button("Plots", "Show or hide each plot", menu)
 
     def _show_plot(self, name: str, shown: bool) -> None:
         self._plots.show_plot(name, shown)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Slot
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeySequence
-from PySide6.QtWidgets import QHBoxLayout, QMenu, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QMenu, QSplitter, QVBoxLayout, QWidget
 
 from dearig.config.presets import PRESETS
 from dearig.errors import InputError
@@ -15,6 +15,7 @@ from dearig.window.documents.draft import Draft, relative_csv
 from dearig.window.documents.file_actions import FileActions
 from dearig.window.documents.segment_editor import SequenceEditor
 from dearig.window.kit.fields import in_words
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import button, menu_button
 from dearig.window.sequence.preview_panel import PreviewPanel
@@ -245,13 +246,13 @@ class SequencePage(Page):
         remember(self.split, self.session.settings, "sequence/columns")
         outer.addWidget(self.split, 1)
 
-    def _tool_bar(self) -> QHBoxLayout:
-        row = QHBoxLayout()
+    def _tool_bar(self) -> Flow:
+        row = Flow()
         presets = QMenu(self)
         for name in PRESETS:
             action = presets.addAction(name)
             action.triggered.connect(lambda _=False, name=name: self.preset(name))
-        row.addWidget(menu_button("&Presets", "Sequences of the thesis and others", presets))
+        row.add(menu_button("&Presets", "Sequences of the thesis and others", presets))
         self.recent = QMenu(self)
         self.recent_button = menu_button("&Recent", "Sequence files used lately", self.recent)
         for words, tip, key, done in (
@@ -266,22 +267,21 @@ class SequencePage(Page):
             made = button(words, f"{tip} ({key})")
             made.setShortcut(QKeySequence(key))
             made.clicked.connect(done)
-            row.addWidget(made)
+            row.add(made)
             if words.startswith("&Open"):
-                row.addWidget(self.recent_button)
+                row.add(self.recent_button)
         self.undo_button = button("↶ Undo", "Undo the last change (Ctrl+Z)")
         self.undo_button.setShortcut(QKeySequence("Ctrl+Z"))
         self.undo_button.clicked.connect(self.editor.undo)
         self.redo_button = button("↷ Redo", "Redo the change (Ctrl+Shift+Z)")
         self.redo_button.setShortcut(QKeySequence("Ctrl+Shift+Z"))
         self.redo_button.clicked.connect(self.editor.redo)
-        row.addWidget(self.undo_button)
-        row.addWidget(self.redo_button)
-        row.addStretch(1)
-        row.addWidget(self.files.name)
+        row.add(self.undo_button)
+        row.add(self.redo_button)
+        row.add(self.files.name, share=1)
         run = button("Go to R&un", "Go to the Run page, to arm and start it", primary=True)
         run.clicked.connect(lambda: self.go_to.emit("Run"))
-        row.addWidget(run)
+        row.add(run)
         return row
 
     @Slot()

@@ -150,8 +150,11 @@ class Session(QObject):
         self.recovery = Recovery(settings, self)  #: unsaved sequence and rig file
 
     def set_address(self, address: str) -> None:
-        """Use the rig ``sim``, ``sim:7``, ``daqmx:Dev1`` or ``daqmx:Dev1@HOST:PORT``."""
-        if address != self.address:
+        """Use the rig ``sim``, ``sim:7``, ``daqmx:Dev1`` or ``daqmx:Dev1@HOST:PORT``.
+
+        Nothing changes while a run or a campaign goes on.
+        """
+        if address != self.address and not self._keeps_rig():
             self.address = address
             self._block_feedforward()
             self.rig_changed.emit()
@@ -171,7 +174,12 @@ class Session(QObject):
         return source_of(self.rig_path)
 
     def set_rig_file(self, path: Path | None, text: str, rig_file: RigFile) -> None:
-        """Use a rig file; recordings keep its ``text``. ``path`` is None if it is not saved."""
+        """Use a rig file; recordings keep its ``text``. ``path`` is None if it is not saved.
+
+        Nothing changes while a run or a campaign goes on.
+        """
+        if self._keeps_rig():
+            return
         self.rig_path, self.rig_text, self.rig_file = path, text, rig_file
         self.preview = None  # it was planned with other limits
         self._block_feedforward()
@@ -180,6 +188,12 @@ class Session(QObject):
             thesis = self.thesis_model
             overlays = tuple(thesis if m.path is None else m for m in self.overlays)
             self.set_overlays(overlays, self.overlay_drive)
+
+    def _keeps_rig(self) -> bool:
+        """Return True, and say so, while something plays: numbers and alarms are of its rig."""
+        if self.running:
+            self.message.emit("The rig stays as it is until the run has ended")
+        return self.running
 
     def set_sequence(self, toml: str, folder: Path, path: Path | None = None) -> None:
         """Use the sequence ``toml``; its CSV files are in ``folder``."""

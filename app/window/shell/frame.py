@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TypeVar, cast
@@ -13,6 +15,7 @@ from PySide6.QtGui import (
     QGuiApplication,
     QKeySequence,
     QMoveEvent,
+    QResizeEvent,
     QShowEvent,
 )
 from PySide6.QtWidgets import (
@@ -63,6 +66,7 @@ from dearig.window.shell.pages import PAGES
 __all__ = ["MainWindow"]
 
 _COLOUR_SCHEMES = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
+_LIST = 116  # px, width of the list of pages
 _SETTLING = 1000  # ms after the window is shown in which a window manager gives it its frame
 P = TypeVar("P", bound=Page)
 
@@ -79,6 +83,7 @@ class MainWindow(QMainWindow):
         self.compilation = Compilation(self)
         self.library = shared_library(session)  # lists the folder while the window is made
         self._pages: dict[type[Page], Page] = {}
+        self._drawn: set[type[Page]] = set()
         self._turns, self._drawing = (Turns(lambda: session.busy, self) for _ in range(2))
         self._make_list()
         self.run_page = self.page(RunPage)
@@ -113,12 +118,20 @@ class MainWindow(QMainWindow):
         return cast(P, self._pages[kind])
 
     def _make_next_page(self) -> bool:
-        """Make a page, or the guide, that has not been needed yet; return False once all are."""
-        kind = next((kind for kind in PAGES if kind not in self._pages), None)
+        """Make a page, or the guide, that was not shown yet; return False once all are.
+
+        It is drawn too: Qt lays a page out, and applies the style sheet to each of its parts, when
+        it is drawn for the first time.
+        """
+        kind = next((kind for kind in PAGES if kind not in self._drawn), None)
         if kind is not None:
-            self.page(kind)
+            page = self.page(kind)
+            self._drawn.add(kind)
+            page.resize(self.stack.size())
+            page.grab()
         elif self._guide is None:
             self._guide = Guide(self)
+            self._guide.grab()
         else:
             return False
         return True
@@ -185,6 +198,10 @@ class MainWindow(QMainWindow):
         QTimer.singleShot(0, self._fit_screen)
         # a window manager adds its frame, and moves the window for it, soon after that
         QTimer.singleShot(_SETTLING, self._settled)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        with self._drawn_in_turns(self.stack):
+            super().resizeEvent(event)
 
     def moveEvent(self, event: QMoveEvent) -> None:  # noqa: N802
         super().moveEvent(event)
@@ -269,7 +286,7 @@ class MainWindow(QMainWindow):
     def _make_list(self) -> None:
         self.list = QListWidget()
         self.list.setObjectName("pages")
-        self.list.setFixedWidth(132)
+        self.list.setFixedWidth(_LIST)
         self.list.setAccessibleName("Pages")
         self.stack = _Stack()
         for place, kind in enumerate(PAGES):
@@ -344,7 +361,7 @@ class MainWindow(QMainWindow):
         made.setToolTip("Guide (F1), colour scheme, layout, errors of the program")
         made.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         made.setMenu(menu)
-        made.setFixedWidth(132)
+        made.setFixedWidth(_LIST)
         made.setMinimumHeight(32)
         return made
 
@@ -387,14 +404,24 @@ class MainWindow(QMainWindow):
     @Slot(int)
     def _page_changed(self, row: int) -> None:
         page = self.page(PAGES[row])
-        # what takes long to draw is drawn in turns of its own while the rig is busy
+        self._drawn.add(PAGES[row])
+        with self._drawn_in_turns(page):
+            self.stack.setCurrentWidget(page)
+        self.session.settings.setValue("page", row)
+
+    @contextmanager
+    def _drawn_in_turns(self, page: QWidget) -> Iterator[None]:
+        """Draw each part of ``page`` that takes long in a turn of its own while the rig is busy."""
         self._drawing.finish()
         parts = page.findChildren(QAbstractScrollArea)
         for part in (page, *parts) if self.session.busy else ():
             part.setUpdatesEnabled(False)
-        self.stack.setCurrentWidget(page)
-        self._drawing.add(partial(part.setUpdatesEnabled, True) for part in (page, *parts))
-        self.session.settings.setValue("page", row)
+        yield
+        # what is in view first: until it is drawn, there is what was there before
+        self._drawing.add(
+            partial(part.setUpdatesEnabled, True)
+            for part in (page, *sorted(parts, key=lambda part: not part.isVisible()))
+        )
 
     @Slot(Path)
     def _show_recording(self, path: Path) -> None:
@@ -484,6 +511,14 @@ class _Stack(QStackedWidget):
     def minimumSizeHint(self) -> QSize:  # noqa: N802
         shown = self.currentWidget()
         return super().minimumSizeHint() if shown is None else shown.minimumSizeHint()
+
+    def heightForWidth(self, width: int) -> int:  # noqa: N802
+        """Return what the page needs at least; Qt would return what it likes to have."""
+        shown = self.currentWidget()
+        layout = None if shown is None else shown.layout()
+        if layout is None or not layout.hasHeightForWidth():
+            return self.minimumSizeHint().height()
+        return layout.totalMinimumHeightForWidth(width)
 
 
 def _scrollable(pages: QWidget) -> QScrollArea:

@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 from PySide6.QtCore import QSignalBlocker, Slot
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from dearig.analysis.outcomes import Comparison
 from dearig.report.text.numbers import significant
 from dearig.units import SHOWN, SHOWN_CHANNELS, Shown, ShownChannel
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import ElidedLabel, name_list
 from dearig.window.plots.area import PlotArea
@@ -49,13 +50,11 @@ class BeforeAfterPlot(QWidget):
         self.channel.setToolTip("Measured signal that is shown with its predictions and residuals")
         shown = QLabel("C&hannel")
         shown.setBuddy(self.channel)
-        self.error_summary = ElidedLabel("muted")
-        top = QHBoxLayout()
-        top.addWidget(of)
-        top.addWidget(self.record)
-        top.addWidget(shown)
-        top.addWidget(self.channel)
-        top.addWidget(self.error_summary, 1)
+        self.error_summary = ElidedLabel("muted", hugging=True)
+        top = Flow()
+        top.add(of, self.record)
+        top.add(shown, self.channel)
+        top.add(self.error_summary, share=1)
         self.area = PlotArea(session, "Measurement, models and residuals")
         labels = ("Voltage (kV)", "Displacement (mm)", "Residual (µm)", "Residual (µm)")
         # each residual has a plot: one would hide the other, which is about as large

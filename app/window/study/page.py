@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QMenu,
     QRadioButton,
-    QSpinBox,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -32,6 +31,8 @@ from dearig.window.jobs.background import Background
 from dearig.window.jobs.job_controls import JobControls, splitter
 from dearig.window.jobs.worker import Worker
 from dearig.window.kit.browser import open_in_browser
+from dearig.window.kit.flow import Flow
+from dearig.window.kit.number_box import WholeBox
 from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.turns import Turns
@@ -110,7 +111,7 @@ class StudyPage(Page):
         both.addButton(self.diagnose)
         both.addButton(self.identify)
         self.diagnose.toggled.connect(self._kind_changed)
-        self.branches = QSpinBox(minimum=1, maximum=BRANCHES_MAX, value=3)
+        self.branches = WholeBox(1, BRANCHES_MAX, 3)
         self.branches.setToolTip("Number of Maxwell relaxation branches")
         self.spring = QComboBox()
         self.spring.addItems(_SPRINGS)
@@ -184,10 +185,9 @@ class StudyPage(Page):
         top = QHBoxLayout()
         top.addWidget(self.headline, 1)
         top.addWidget(self.reopen_button, 0, Qt.AlignmentFlag.AlignTop)
-        tools = QHBoxLayout()
+        tools = Flow()
         for made in (self.overlay_button, self.save_button, self.report_button, self.run_button):
-            tools.addWidget(made)
-        tools.addStretch(1)
+            tools.add(made)
 
         self.verdict = ReportPage()
         self.curves = BeforeAfterPlot(self._session)

@@ -8,11 +8,12 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QSignalBlocker, Slot
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from dearig.analysis.study import Residual
 from dearig.model.residual import Dependence, MissingStress
 from dearig.units import SHOWN, readable
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import label, name_list
 from dearig.window.plots.area import PlotArea
@@ -58,15 +59,13 @@ class ResidualPlots(QWidget):
         self.remarks = label("", "muted")
         self.remarks.setWordWrap(True)
 
-        row = QHBoxLayout()
+        row = Flow()
         for text, box in (
             ("Recor&ding", self.record), ("A&gainst", self.quantity), ("Mode&l", self.stand),
         ):  # fmt: skip
             of = QLabel(text)
             of.setBuddy(box)
-            row.addWidget(of)
-            row.addWidget(box)
-        row.addStretch(1)
+            row.add(of, box)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.addLayout(row)

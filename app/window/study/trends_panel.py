@@ -10,7 +10,7 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QSignalBlocker, Qt, Slot
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QSplitter, QVBoxLayout, QWidget
 
 from dearig.batch.table_file import read_table
 from dearig.batch.trend import Trend
@@ -27,6 +27,7 @@ from dearig.report.text.trends import (
 )
 from dearig.window.documents.dialogs import choose_file, save_as
 from dearig.window.jobs.background import Background
+from dearig.window.kit.flow import Flow
 from dearig.window.kit.report_page import ReportPage
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, label
@@ -72,8 +73,8 @@ class TrendsPanel(QWidget):
         self.report_button = button("Save re&port …", "Write these trends as an HTML report")
         self.report_button.clicked.connect(self._ask_report)
         self.number, self.column, self.film = QComboBox(), QComboBox(), QComboBox()
-        top = QHBoxLayout()
-        top.addWidget(self.open_button)
+        top = Flow()
+        top.add(self.open_button)
         for text, box, tip in (
             ("&Number", self.number, "Parameter or error that is shown"),
             ("A&gainst", self.column, "What may change it; the other columns are at their means"),
@@ -83,10 +84,8 @@ class TrendsPanel(QWidget):
             box.setToolTip(tip)
             caption = QLabel(text)
             caption.setBuddy(box)
-            top.addWidget(caption)
-            top.addWidget(box)
-        top.addStretch(1)
-        top.addWidget(self.report_button)
+            top.add(caption, box)
+        top.add(self.report_button)
         self.message = Message()
         self.words = label("", "muted")
         self.words.setWordWrap(True)

@@ -303,12 +303,12 @@ class Striker(grpc.UnaryUnaryClientInterceptor):
 STRUCK_CALLS = 24  # of a stop or a read, and of the way to 0 V after it
 
 
-# both acts together strike at two of three calls of each way, in tests.deep each at all of them
+# both acts together strike at two of five calls of each way, in tests.deep each at all of them
 @pytest.mark.parametrize(
     ("act", "first", "step"),
     [
-        pytest.param("reset", 1, 3),
-        pytest.param("clear", 2, 3),
+        pytest.param("reset", 1, 5),
+        pytest.param("clear", 3, 5),
         pytest.param("reset", 1, 1, marks=pytest.mark.deep),
         pytest.param("clear", 1, 1, marks=pytest.mark.deep),
     ],

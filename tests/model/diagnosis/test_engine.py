@@ -104,6 +104,7 @@ def test_a_form_that_no_law_with_a_name_has_is_found_by_the_general_law() -> Non
     record = of_no_named_form()
     found = diagnose([record], PLAIN, workers=1)
     assert found.verdict == "explained"
+    assert not found.held  # where it is known, there is nothing to recognise
     (step,) = found.steps
     assert (step.effect, step.family) == ("general sensor curve", "sensor_nonlinearity")
     assert EFFECTS[step.nearest].family == "sensor_nonlinearity"

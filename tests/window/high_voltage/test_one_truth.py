@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from pytestqt.qtbot import QtBot
@@ -15,6 +16,7 @@ from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.high_voltage.status import OutputReading
 from dearig.window.rig.page import RigPage
 from dearig.window.run.live import RunSnapshot
+from dearig.window.session.text_file import EditedFile
 from dearig.window.shell.frame import MainWindow
 from tests.window.conftest import SHORT, press
 
@@ -59,6 +61,48 @@ def test_another_rig_file_has_none_either(
     play(qtbot, window)
     window.session.set_rig_file(None, "", RigFile())
     assert readouts(window) == {NOTHING}
+
+
+def test_no_other_rig_while_something_plays(
+    qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
+) -> None:
+    """The page is disabled meanwhile; a file that was being read before may still arrive."""
+    page, session, rig = window.run_page, window.session, window.page(RigPage)
+    weak = "[interlocks]\narc_action = 'ramp'\n"
+    before = (session.address, session.rig_text, session.rig_file)
+    changes: tuple[Callable[[], object], ...] = (
+        lambda: session.set_address("sim:7"),
+        lambda: session.set_rig_file(Path("weak.toml"), weak, RigFile()),
+        lambda: rig._opened(weak, EditedFile("rig file", weak, Path("weak.toml"))),
+        lambda: (rig.seed.setValue(9), rig.kinds.button(1).setChecked(True), rig.choose()),
+        rig._saved,
+    )
+    plan_of(SHORT)
+    page.paced.setChecked(True)
+    for change in changes[:2]:  # a rig that is armed is disarmed
+        press(qtbot, page.arm_button)
+        assert session.armed
+        change()
+        assert not session.armed
+        assert not page.start_button.isEnabled()
+        session.set_address(before[0])
+        session.set_rig_file(None, before[1], RigFile())
+        plan_of(SHORT)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
+    qtbot.waitUntil(lambda: "left" in page.controls.time_left.text(), timeout=RUN_MS)
+    number = page.runner.status.run_number
+    for change in changes:
+        change()
+        assert (session.address, session.rig_text, session.rig_file) == before
+        assert window.bar.badge.state is HighVoltage.ON
+        assert page.runner.status.run_number == number
+        assert page.controls.rig.full_text == "sim with the rig file of the thesis"
+    assert rig.kinds.checkedId() == 0
+    qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)
+    assert window.bar.badge.state is HighVoltage.CONFIRMED
+    session.set_address("sim:7")
+    assert window.bar.badge.state is HighVoltage.NOT_CONTACTED
 
 
 def test_the_number_at_rest_is_the_one_that_confirmed_zero_volts(

@@ -46,3 +46,7 @@ def test_all_of_a_page_that_is_opened_while_armed_is_drawn_in_the_end(
     window.show_page(page)
     qtbot.waitUntil(lambda: all(part.updatesEnabled() for part in parts))
     assert window.run_page.updatesEnabled()
+    window.resize(window.width() + 50, window.height())
+    shown = window.stack.findChildren(QAbstractScrollArea)
+    assert not any(part.updatesEnabled() for part in shown)
+    qtbot.waitUntil(lambda: all(part.updatesEnabled() for part in (window.stack, *shown)))

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import QApplication
 
 from dearig.window.kit.theme import DARK, LIGHT
 from dearig.window.plots.area import PlotArea
+from dearig.window.plots.canvas import GAP
 from dearig.window.plots.curve import PlotCurve, cut_lines
 from dearig.window.plots.plot import AxisText, Plot
 from dearig.window.session.state import Session
@@ -399,7 +400,7 @@ def test_hidden_plot_leaves_its_height_to_the_others(shown: Shown) -> None:
     least = shown.area.canvas.minimumHeight()
     shown.area.show_plot(shown.residual, shown=False)
     QApplication.processEvents()
-    assert shown.area.canvas.minimumHeight() == least - 60
+    assert shown.area.canvas.minimumHeight() == least - 54 - GAP
     assert shown.voltage.vb.height() > before + 60.0
     assert shown.voltage.getAxis("bottom").style["showValues"]  # the lowest over time now
     shown.area.show_plot(shown.residual, shown=True)

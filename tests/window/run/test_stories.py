@@ -219,16 +219,22 @@ def test_a_second_stop_is_0_volts_at_once(qtbot: QtBot, window: MainWindow) -> N
 @pytest.mark.parametrize(
     ("fault", "headline", "words"),
     [
-        ("arc@3+0.5", "Stopped by an interlock", "breakdown"),
-        ("sensor-out-of-range@3", "Stopped by an interlock", "laser"),
+        ("arc@1+0.5", "Stopped by an interlock", "breakdown"),
+        ("sensor-out-of-range@1", "Stopped by an interlock", "laser"),
         ("electrode-open@0", "Stopped by an interlock", "follow"),
-        ("ai-overflow@3", "Instrument fault", "overwritten"),
+        ("ai-overflow@1", "Instrument fault", "overwritten"),
     ],
 )
 def test_what_goes_wrong_is_said_and_the_rig_is_safe(
-    qtbot: QtBot, run_page: RunPage, fault: str, headline: str, words: str
+    qtbot: QtBot,
+    run_page: RunPage,
+    plan_of: Callable[[str], None],
+    fault: str,
+    headline: str,
+    words: str,
 ) -> None:
     page = run_page
+    plan_of(SHORT.replace("frequency_Hz = 2.0", "frequency_Hz = 0.2"))
     page.faults = (fault,)
     path = play(qtbot, page)
     assert page.result.text().startswith(headline)

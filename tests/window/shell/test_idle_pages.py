@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
@@ -74,6 +75,10 @@ def test_no_page_is_left_to_be_made_once_the_rig_is_armed(
     window.session.armed_changed.connect(lambda _: states.append(len(window._pages)))
     press(qtbot, window.run_page.arm_button)
     assert states == [len(PAGES)]  # before it was armed, not after
+    # Qt lays out and styles a page when it is drawn first: this is done too
+    assert all(
+        window.page(kind).testAttribute(Qt.WidgetAttribute.WA_WState_Polished) for kind in PAGES
+    )
 
 
 def test_an_idle_window_makes_them_all(window: MainWindow, qtbot: QtBot) -> None:

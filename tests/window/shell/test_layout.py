@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 from PySide6.QtCore import QPoint, QRect
@@ -23,7 +23,14 @@ from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
 from tests.window.conftest import SHORT, press
 from tests.window.made_recordings import made
-from tests.window.shown_text import commands, cut_off, overlapping, stretched
+from tests.window.shown_text import (
+    commands,
+    cut_off,
+    overlapping,
+    sideways,
+    squashed,
+    stretched,
+)
 
 #: The screen of a small notebook, a large one, and the small one at a scale of 1.5 without the
 #: frame of a window.
@@ -33,10 +40,12 @@ PATIENCE = 120_000
 LOOKS = 20
 
 
-def wrong(window: MainWindow, qtbot: QtBot, state: str) -> list[str]:
+def wrong(
+    window: MainWindow, qtbot: QtBot, state: str, sizes: Sequence[tuple[int, int]] = SIZES
+) -> list[str]:
     """Return what is wrong at each size once what is computed and laid out later has arrived."""
     found = []
-    for width, height in SIZES:
+    for width, height in sizes:
         window.resize(width, height)
         for _ in range(LOOKS):
             qtbot.wait(20)
@@ -47,6 +56,8 @@ def wrong(window: MainWindow, qtbot: QtBot, state: str) -> list[str]:
                     ("covered", overlapping),
                     ("command", commands),
                     ("stretched", stretched),
+                    ("scrolls", sideways),
+                    ("squashed", squashed),
                 )
                 for text in look(window)
             ]
@@ -70,11 +81,15 @@ def test_nothing_is_cut_or_covered_on_any_page_at_three_sizes(
     rig.live.start()
     qtbot.waitUntil(lambda: rig.live.table.rowCount() > 0, timeout=PATIENCE)
     found += wrong(window, qtbot, "Rig, live values")
+    follow = window.page(FollowPage)
+    window.show_page(follow)
+    follow.modes.setCurrentWidget(follow.hold)
+    found += wrong(window, qtbot, "Follow, hold")
     window.session.block("test", f"rig file: {LONG}", "Rig")
     status.run_ended(LatchedAlarm("Stopped by an interlock", LONG, time.time(), "sim"))
     for page in window.pages:
         window.show_page(page)
-        found += wrong(window, qtbot, f"{page.title} with an alarm")
+        found += wrong(window, qtbot, f"{page.title} with an alarm", SIZES[-1:])
     status.run_ended(None)
     window.session.unblock("test")
     plan_of(SHORT)

@@ -1,0 +1,110 @@
+"""Fields of a number with arrows, whose text means the same in every language of the system.
+
+Qt's own fields drop the key of a sign that is not the language's decimal one: 0.5 typed on a German
+computer is 5. Here a text that is no number, is ambiguous or outside the limits is shown as it is
+typed, marked, and gives way to the last number when the field is left.
+"""
+
+from __future__ import annotations
+
+import re
+
+from PySide6.QtCore import QLocale, Slot
+from PySide6.QtGui import QValidator
+from PySide6.QtWidgets import QDoubleSpinBox, QSpinBox
+
+from dearig.window.kit.number_text import NumberTextError, read_number
+from dearig.window.kit.widgets import set_wrong
+
+__all__ = ["NumberBox", "WholeBox"]
+
+_TYPED = re.compile(r"[-+0-9.,'\u2019_ ]*")
+
+
+class NumberBox(QDoubleSpinBox):
+    """Takes a number from ``low`` to ``high``, with a decimal point or a decimal comma."""
+
+    def __init__(
+        self, low: float, high: float, value: float, *, decimals: int, unit: str = ""
+    ) -> None:
+        super().__init__(minimum=low, maximum=high, decimals=decimals, value=value, suffix=unit)
+        self.setLocale(QLocale.c())
+        self.setCorrectionMode(QDoubleSpinBox.CorrectionMode.CorrectToPreviousValue)
+        self.setKeyboardTracking(False)  # else the last number is that of half a text
+        self.lineEdit().textChanged.connect(self._mark)
+        self.editingFinished.connect(self._mark)
+
+    def value(self) -> float:
+        """Return the number that is shown; a text that is none gives way to the last one."""
+        self.interpretText()
+        self._mark()
+        return super().value()
+
+    def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
+        return _state(text, self._number(text), self.suffix()), text, at
+
+    def fixup(self, text: str) -> str:
+        return text  # Qt would leave out what may be a decimal sign
+
+    def valueFromText(self, text: str) -> float:  # noqa: N802
+        number = self._number(text)
+        return super().value() if number is None else number
+
+    def _number(self, text: str) -> float | None:
+        return _read(text.removesuffix(self.suffix()), self.minimum(), self.maximum())
+
+    @Slot()
+    def _mark(self) -> None:
+        set_wrong(self, self._number(self.lineEdit().text()) is None)
+
+
+class WholeBox(QSpinBox):
+    """Takes a whole number from ``low`` to ``high``."""
+
+    def __init__(self, low: int, high: int, value: int) -> None:
+        super().__init__(minimum=low, maximum=high, value=value)
+        self.setLocale(QLocale.c())
+        self.setCorrectionMode(QSpinBox.CorrectionMode.CorrectToPreviousValue)
+        self.setKeyboardTracking(False)  # else the last number is that of half a text
+        self.lineEdit().textChanged.connect(self._mark)
+        self.editingFinished.connect(self._mark)
+
+    def value(self) -> int:
+        """Return the number that is shown; a text that is none gives way to the last one."""
+        self.interpretText()
+        self._mark()
+        return super().value()
+
+    def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
+        return _state(text, self._number(text), ""), text, at
+
+    def fixup(self, text: str) -> str:
+        return text  # Qt would leave out what may be a decimal sign
+
+    def valueFromText(self, text: str) -> int:  # noqa: N802
+        number = self._number(text)
+        return super().value() if number is None else number
+
+    def _number(self, text: str) -> int | None:
+        found = _read(text, self.minimum(), self.maximum(), whole=True)
+        return None if found is None or found != int(found) else int(found)
+
+    @Slot()
+    def _mark(self) -> None:
+        set_wrong(self, self._number(self.lineEdit().text()) is None)
+
+
+def _read(text: str, low: float, high: float, *, whole: bool = False) -> float | None:
+    try:
+        number = read_number(text, whole)
+    except NumberTextError:
+        return None
+    return number if low <= number <= high else None
+
+
+def _state(text: str, number: float | None, suffix: str) -> QValidator.State:
+    if number is not None:
+        return QValidator.State.Acceptable
+    # a key that is dropped would change the number
+    typed = _TYPED.fullmatch(text.removesuffix(suffix))
+    return QValidator.State.Intermediate if typed else QValidator.State.Invalid
