@@ -347,6 +347,8 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "rivals": list(experiment.rivals),
             "separation_over_noise": finite(experiment.separation),
             "seconds": finite(experiment.seconds),
+            "average": experiment.average,
+            "separation_by_channel": {n: finite(apart) for n, apart in experiment.by_channel},
         },
         "experiment_words": outcome.experiment_words,
         "excitation": _excitation_json(outcome),
