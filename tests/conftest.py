@@ -4,6 +4,7 @@ import os
 import signal
 import tempfile
 import threading
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -35,8 +36,20 @@ def pytest_runtest_setup() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Let distributed tests run in the order of ``pytest_collection_modifyitems``."""
+    config.option.loadscopereorder = False
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect the deep tests that are not of the share that ``tests.deep`` chose."""
+    """Put the longest files first, and deselect deep tests that are not of the chosen share.
+
+    A long file that comes last keeps one process busy while the others have nothing left. Those
+    with a slow test are the longest, then those with many tests.
+    """
+    sizes = Counter(item.path for item in items)
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: (item.path not in slow, -sizes[item.path], item.path))
     if VARIABLE not in os.environ:
         return
     marks = ("deep", "more_examples")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 import threading
 from queue import SimpleQueue
-from types import TracebackType
 
 from dearig.drivers.rig import Event
 
@@ -36,12 +35,7 @@ class EventLog:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """End the thread, or leave it behind where it is held."""
         self._inbox.put(None)
         self._thread.join(_ENDS_WITHIN)

@@ -6,7 +6,7 @@ import signal
 import threading
 import weakref
 from collections.abc import Callable
-from types import FrameType, TracebackType
+from types import FrameType
 
 __all__ = ["Interrupts", "ends_program", "ignore_interrupts", "terminal_closed"]
 
@@ -122,12 +122,7 @@ class Interrupts:
                     signal.signal(number, self._handle)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Restore the handlers that were there before."""
         _runs.discard(self)
         for number, before in self._before.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,12 @@ from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.budget import diagnosis_with_budget, given_values
 from dearig.analysis.cores import for_simulations
-from dearig.analysis.experiment import experiment_of, with_excitation
+from dearig.analysis.experiment import averaging, experiment_of, with_excitation
 from dearig.analysis.outcomes import (
     Comparison,
     DiagnoseOutcome,
     Evaluation,
+    SeparatingExperiment,
     budget_table,
     covariance_table,
     estimate_table,
@@ -233,6 +234,7 @@ class _Parts:
         return lambda stage, fraction: self.progress(stage, (first + size * fraction) / self.total)
 
 
+@dataclass
 class _Recorder:
     """Runs on the rig at ``address``, each recorded to a file in the folder ``out``.
 
@@ -240,41 +242,36 @@ class _Recorder:
     files of complete runs.
     """
 
-    def __init__(
-        self,
-        address: str,
-        out: Path,
-        rig_file: RigFile,
-        options: RunOptions,
-        parts: _Parts,
-        runs: int,
-    ) -> None:
-        self.address = address
-        self.out = out
-        self.rig_file = rig_file
-        self.options = options
-        self.parts = parts
-        self.runs = runs
-        self.made: list[Path] = []
+    address: str
+    out: Path
+    rig_file: RigFile
+    options: RunOptions
+    parts: _Parts
+    runs: int
+    made: list[Path] = field(default_factory=list)
 
-    def run(self, name: str, sequence: str = "") -> None:
-        """Record the preset ``name``, or the text of a ``sequence`` under that name."""
-        path = self.out / f"{name}.h5"
-        loaded = parse_sequence(sequence, name, Path()) if sequence else load_sequence(name)
+    def run(self, name: str, proposed: SeparatingExperiment | None = None) -> None:
+        """Record the preset ``name``, or what is ``proposed`` under that name."""
+        path, rig_file, loaded = self.out / f"{name}.h5", self.rig_file, None
+        if proposed is not None:
+            rig_file = averaging(rig_file, proposed.average)
+            loaded = parse_sequence(proposed.sequence, name, Path())
         report = self.parts.part(1.0 / self.runs)
         # each run has its own seed, so that its noise is independent of the others'
         options = replace(self.options, seed=self.options.seed * 1000 + len(self.made))
         record(
-            loaded, self.address, self.rig_file, path, options,
+            loaded or load_sequence(name), self.address, rig_file, path, options,
             progress=lambda _, fraction: report(f"recording {name}", fraction),
         )  # fmt: skip
         self.made.append(path)
 
-    def run_until_ended(self, *names: str, sequence: str = "") -> DearigError | None:
+    def run_until_ended(
+        self, *names: str, proposed: SeparatingExperiment | None = None
+    ) -> DearigError | None:
         """Record each of ``names`` as ``run`` does; return the error that ended one early."""
         try:
             for name in names:
-                self.run(name, sequence)
+                self.run(name, proposed)
         except NotSafe:
             raise
         except _EARLY_ENDS as error:
@@ -303,11 +300,11 @@ def _search_and_separate(
             return readings, finding, performed, None
         noise = _noise(readings)
         left = finding.verdict in (PARTLY_EXPLAINED, UNEXPLAINED)
-        experiment, words = experiment_of(finding, noise, settings.rig, left)
+        experiment, words = experiment_of(finding, noise, settings.rig, left, readings)
         if experiment is None:
             return readings, finding, performed, None
         name = _experiment_name(len(performed))
-        ended = recorder.run_until_ended(name, sequence=experiment.sequence)
+        ended = recorder.run_until_ended(name, proposed=experiment)
         if ended is not None:
             return readings, finding, performed, ended
         readings, _ = settings.read([*readings, recorder.made[-1]])
@@ -399,8 +396,6 @@ def _outcome(
         fitted, others = ([each.held() for each in some] for some in (fitted, others))
     failed: list[str] = []
     models = [finding.baseline, *(s.stage for s in finding.steps[:-1]), finding.final]
-    if not finding.steps:
-        models = [finding.baseline, finding.final]
     stands = tuple(
         Evaluation(
             tuple(name for name, _ in stage.model.effects),
@@ -455,7 +450,7 @@ def _outcome(
     )
     outcome = with_excitation(outcome, settings.rig)
     if outcome.kind == "actuator":
-        experiment, words = experiment_of(finding, noise, settings.rig, outcome.is_rejected)
+        experiment, words = experiment_of(finding, noise, settings.rig, outcome.is_rejected, fitted)
         outcome = replace(outcome, experiment=experiment, experiment_words=words)
     if not outcome.recommends_final:
         plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)

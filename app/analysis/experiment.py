@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,15 @@ from dearig.analysis.outcomes import (
 )
 from dearig.analysis.readings.band import motion_of
 from dearig.analysis.readings.compatibility import of_rig
+from dearig.analysis.readings.record import Readings
+from dearig.analysis.readings.rig_channels import AVERAGED, RigChannels, channels_of
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.interlocks import would_trip
 from dearig.drivers.samples import Repeated
+from dearig.drivers.settings import CardSettings
 from dearig.errors import InputError
 from dearig.model.diagnosis.excitation import Excitation, Motion, excitation, range_of
 from dearig.model.diagnosis.results import Diagnosis
@@ -39,6 +42,7 @@ from dearig.model.simulation.excitation import THESIS_AMPLITUDES
 __all__ = [
     "SEPARATES",
     "SHARED",
+    "averaging",
     "candidates",
     "determining_record",
     "experiment_of",
@@ -117,7 +121,10 @@ def _steps(top_kV: float, dwell_s: float, repeats: int) -> dict[str, Any]:
 
 
 def separating_experiment(
-    rivals: Sequence[tuple[str, str, Actuator]], rig_file: RigFile, noise: float
+    rivals: Sequence[tuple[str, str, Actuator]],
+    rig_file: RigFile,
+    noise: float,
+    electric: RigChannels | None = None,
 ) -> tuple[SeparatingExperiment | None, str]:
     """Return the sequence that separates the two closest of ``rivals`` best, and a sentence on it.
 
@@ -126,57 +133,157 @@ def separating_experiment(
     ``rivals`` are (label, family, fitted model), the final model among them; ``noise`` is the floor
     of one reading in m. Every sequence passes the gate of ``rig_file`` and trips no interlock if
     the film does what any rival predicts. Where there is no such sequence, the sentence says why.
+    With the ``electric`` channels of the rig, what they would tell counts as well, as so much more
+    displacement; a recording with more conversions in a row is proposed where that tells more.
     """
     labels = tuple(label for label, _, _ in rivals)
     families = tuple(dict.fromkeys(family for _, family, _ in rivals))
-    made: list[tuple[str, dict[tuple[str, str], float], float, str]] = []
+    made: list[_Tried] = []
     for name, text in candidates(_top_kV(rig_file)).items():
         playable = _playable(text, name, rivals, rig_file, noise)
         if playable is None:
             continue
         loaded, waveform, predictions = playable
-        apart = {
-            (labels[i], labels[j]): root_mean_square(predictions[i] - predictions[j]) / noise
-            for i, j in combinations(range(len(rivals)), 2)
-        }
-        made.append((name, apart, waveform.duration, loaded.toml))
+        for average in _averages(electric, loaded, rig_file):
+            apart = {
+                (labels[i], labels[j]): _separation(
+                    (rivals[i][2], rivals[j][2]), (predictions[i], predictions[j]),
+                    waveform, noise, electric, average, rig_file.card,
+                )
+                for i, j in combinations(range(len(rivals)), 2)
+            }  # fmt: skip
+            made.append(_Tried(name, apart, waveform.duration, loaded.toml, average))
     if not made:
         return None, (
             "None of the candidate excitations can be played: each would break a limit or trip an "
             "interlock of the rig file"
         )
-    pairs = list(made[0][1])
-    separable = [p for p in pairs if max(apart[p] for _, apart, _, _ in made) >= SEPARATES]
-    tried: list[tuple[str, float, float, tuple[str, str], str]] = []
-    for name, apart, seconds, toml in made:
-        closest = min(separable or pairs, key=lambda pair: apart[pair])
-        tried.append((name, apart[closest], seconds, closest, toml))
-    tried.sort(key=lambda t: -t[1])
-    best = tried[0][1]
+    pairs = list(made[0].apart)
+    separable = [p for p in pairs if max(t.apart[p].whole for t in made) >= SEPARATES]
+
+    def closest(tried: _Tried) -> tuple[str, str]:
+        return min(separable or pairs, key=lambda pair: tried.apart[pair].whole)
+
+    def separation(tried: _Tried) -> float:
+        return tried.apart[closest(tried)].whole
+
+    made.sort(key=separation, reverse=True)
+    best = separation(made[0])
     if best < SEPARATES:
         return None, (
-            f"None of {len(tried)} excitations within the rig's limits separates {_and(labels)}: "
-            f"at best their predictions differ by {best:.2g} times the noise"
+            f"None of {len({t.name for t in made})} excitations within the rig's limits separates "
+            f"{_and(labels)}: at best their predictions differ by {best:.2g} times the noise"
         )
-    good = [t for t in tried if t[1] >= _NEAR_BEST * best]
-    name, separation, seconds, closest, toml = max(good, key=lambda t: t[1] / t[2])
-    alike = [_and(p) for p in pairs if p not in separable]
-    but = f". No excitation separates {'; '.join(alike)}" if alike else ""
+    good = [t for t in made if separation(t) >= _NEAR_BEST * best]
+    # what the rig does already, where that tells as much
+    average = min(t.average for t in good)
+    chosen = max((t for t in good if t.average == average), key=lambda t: separation(t) / t.seconds)
     found = SeparatingExperiment(
-        name=name,
-        sequence=toml,
+        name=chosen.name,
+        sequence=chosen.toml,
         rivals=labels,
         separates=families,
-        separation=separation,
-        closest=closest,
-        seconds=seconds,
-        tried=tuple((t[0], t[1], t[2]) for t in tried),
+        separation=separation(chosen),
+        closest=closest(chosen),
+        seconds=chosen.seconds,
+        tried=tuple(
+            (t.name, separation(t), t.seconds) for t in made if t.average == chosen.average
+        ),
+        average=chosen.average,
+        by_channel=chosen.apart[closest(chosen)].by_channel,
     )
+    alike = [_and(p) for p in pairs if p not in separable]
+    but = f". No excitation separates {'; '.join(alike)}" if alike else ""
+    usual = electric.average if electric is not None else 1
     return found, (
-        f"{name!r} ({seconds:.0f} s) separates {_and(labels)} best among {len(tried)} "
-        f"excitations within the rig's limits: the predictions of any two differ by at least "
-        f"{separation:.2g} times the noise{but}"
+        f"{chosen.name!r} ({chosen.seconds:.0f} s) separates {_and(labels)} best among "
+        f"{len(found.tried)} excitations within the rig's limits: the predictions of any two "
+        f"differ by at least {found.separation:.2g} times the noise"
+        f"{_by_channels(found, usual)}{but}"
     )
+
+
+@dataclass(frozen=True)
+class _Apart:
+    """How far two predictions are apart, in noises of the displacement.
+
+    ``by_channel`` are RMS differences, each in noises of its own channel.
+    """
+
+    whole: float
+    by_channel: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class _Tried:
+    name: str
+    apart: Mapping[tuple[str, str], _Apart]
+    seconds: float
+    toml: str
+    average: int
+
+
+def _averages(
+    electric: RigChannels | None, loaded: LoadedSequence, rig_file: RigFile
+) -> tuple[int, ...]:
+    """Return the numbers of conversions in a row to be tried: what the rig does, and more."""
+    if electric is None:
+        return (rig_file.card.average,)
+    if not electric.channels or electric.average >= AVERAGED:
+        return (electric.average,)
+    try:
+        plan(loaded, averaging(rig_file, AVERAGED)).admitted()
+    except InputError:
+        return (electric.average,)
+    return electric.average, AVERAGED
+
+
+def averaging(rig_file: RigFile, average: int) -> RigFile:
+    """Return ``rig_file`` with ``average`` conversions in a row."""
+    card = rig_file.card.model_copy(update={"average": average})
+    return rig_file.model_copy(update={"card": card})
+
+
+def _separation(
+    models: tuple[Actuator, Actuator],
+    predictions: tuple[np.ndarray, np.ndarray],
+    waveform: GatedWaveform,
+    noise: float,
+    electric: RigChannels | None,
+    average: int,
+    card: CardSettings,
+) -> _Apart:
+    """Return how far two models are apart; of two films that could be, the one that shows less."""
+    moved = root_mean_square(predictions[0] - predictions[1]) / noise
+    if electric is None or not electric.channels:
+        return _Apart(moved, (("displacement", moved),))
+    stride = round(waveform.samples / predictions[0].size)
+    conversions = stride * average / card.average
+    drive = _drive(waveform, stride)
+    ways = [
+        electric.apart(
+            models[i], models[1 - i], drive, predictions[i], conversions, means=average > 1
+        )
+        for i in (0, 1)
+    ]
+    told = min(ways, key=lambda way: sum(chi2 for chi2, _ in way.values()))
+    chi2 = sum(value for value, _ in told.values())
+    return _Apart(
+        math.sqrt(moved**2 + chi2 * card.average / waveform.samples),
+        (("displacement", moved), *((name, rms) for name, (_, rms) in told.items())),
+    )
+
+
+def _by_channels(found: SeparatingExperiment, usual: int) -> str:
+    """Return which channel tells most, and how it is to be recorded; "" without channels."""
+    if len(found.by_channel) < 2:
+        return ""
+    # means at 200 Hz of a channel are as many as the rows or fewer
+    name, apart = max(found.by_channel, key=lambda pair: pair[1])
+    said = f". The {name.replace('_', ' ')} tells most: {apart:.2g} times its noise"
+    if found.average != usual:
+        said += f", recorded with [card] average = {found.average}"
+    return said
 
 
 def determining_record(
@@ -285,8 +392,7 @@ def _predictions(
 
     None where one fails or exceeds the field limit.
     """
-    peaks = peaks_of(waveform, stride)
-    drive = Drive(np.arange(peaks.size) * (stride / waveform.rate), peaks, hold=True)
+    drive = _drive(waveform, stride)
     found = []
     for _, _, model in rivals:
         response = model.simulate(drive)
@@ -298,17 +404,27 @@ def _predictions(
     return found
 
 
+def _drive(waveform: GatedWaveform, stride: int) -> Drive:
+    peaks = peaks_of(waveform, stride)
+    return Drive(np.arange(peaks.size) * (stride / waveform.rate), peaks, hold=True)
+
+
 def _and(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
 
 
 def experiment_of(
-    finding: Diagnosis, noise: float, rig_file: RigFile, rejected: bool = False
+    finding: Diagnosis,
+    noise: float,
+    rig_file: RigFile,
+    rejected: bool = False,
+    readings: Sequence[Readings] = (),
 ) -> tuple[SeparatingExperiment | None, str]:
     """Return the experiment that separates the final model from its rivals, and a sentence.
 
     Rivals are the families that explain the data as well, and those that share the probability.
-    Where the final model is ``rejected``, they are the most probable of all others.
+    Where the final model is ``rejected``, they are the most probable of all others. The electrical
+    channels of the ``readings`` that were fitted count as well, where they were of use.
     """
     final = finding.final.model
     if not isinstance(final, Actuator):
@@ -325,7 +441,12 @@ def experiment_of(
         if isinstance(model, Actuator):
             rivals.append((_model_label(model), family, model))
     if len(rivals) > 1:
-        return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)
+        return separating_experiment(
+            rivals,
+            of_rig(rig_file, final.film, final.load),
+            noise,
+            channels_of(readings, finding) if readings else None,
+        )
     if rejected:
         return None, (
             "The model leaves more than noise, and no other was fitted that an experiment could "

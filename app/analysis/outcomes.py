@@ -279,6 +279,8 @@ class SeparatingExperiment:
     ``rivals`` are the labels of the models, ``separates`` their families. ``separation`` is the
     smallest RMS difference between the predictions of any two of them, in noise floors; ``closest``
     names those two. ``tried`` are all sequences with that number and their duration in s.
+    ``average`` is the number of conversions in a row that it is to be recorded with. ``by_channel``
+    are the RMS differences of the closest two in each channel, in its own noise.
     """
 
     name: str
@@ -289,6 +291,8 @@ class SeparatingExperiment:
     closest: tuple[str, str]
     seconds: float
     tried: tuple[tuple[str, float, float], ...]
+    average: int = 1
+    by_channel: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)

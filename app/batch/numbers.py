@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
+from dearig.recording.json_file import finite
 from dearig.recording.reading.recording import Recording
 from dearig.units import SHOWN, parameter_key, parameter_unit
 
@@ -45,9 +46,9 @@ def parameter_of(estimate: Any, before: str = "") -> dict[str, Any]:
     name = estimate.name if is_whole else before + estimate.name
     return {
         "name": parameter_key(name, estimate.unit),
-        "value": _finite(estimate.value * factor),
-        "low95": _finite(estimate.low * factor) if estimate.low != 0.0 else None,
-        "high95": _finite(estimate.high * factor),
+        "value": finite(estimate.value * factor),
+        "low95": finite(estimate.low * factor) if estimate.low != 0.0 else None,
+        "high95": finite(estimate.high * factor),
         "determined": bool(estimate.determined),
     }
 
@@ -106,7 +107,3 @@ def _named(what: str, comparisons: Iterable[Comparison]) -> Iterator[tuple[str, 
     for comparison in comparisons:
         for name, value in errors_of(comparison).items():
             yield f"{what}_{name}", value
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

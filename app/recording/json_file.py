@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,12 @@ from typing import Any
 from dearig.errors import InputError
 from dearig.recording.files import check_output, replaced_when_done
 
-__all__ = ["write_json"]
+__all__ = ["finite", "write_json"]
+
+
+def finite(value: float | None) -> float | None:
+    """Return ``value`` as a number of JSON, which has neither NaN nor infinity: None for them."""
+    return float(value) if value is not None and math.isfinite(value) else None
 
 
 def write_json(obj: dict[str, Any], target: str | Path) -> None:

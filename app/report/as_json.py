@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import (
@@ -14,6 +13,7 @@ from dearig.analysis.outcomes import (
     pooled_steady_rms,
 )
 from dearig.model.verdict import COMPLETE, STOPPED, is_rejected, smallest_p
+from dearig.recording.json_file import finite
 from dearig.report.made import made_now
 from dearig.report.stored import Outcome, stored
 from dearig.report.text.bands import band_json
@@ -82,11 +82,11 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "status": STOPPED if outcome.interrupted else COMPLETE,
         "model_path": outcome.model_path,
         **_noise_json(outcome.kind, outcome.train),
-        "residual_over_noise": _number(pooled_over_noise(outcome.train)),
+        "residual_over_noise": finite(pooled_over_noise(outcome.train)),
         **_rejection_json(outcome.train),
-        "prior_p": _number(fit.prior_p),
+        "prior_p": finite(fit.prior_p),
         "starts": [
-            {"mean_square_over_noise": _number(cost), "followed": followed}
+            {"mean_square_over_noise": finite(cost), "followed": followed}
             for cost, followed in fit.starts
         ],
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
@@ -101,48 +101,35 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "simulations": int(fit.simulations),
         "few_data": outcome.few_data,
         "assumed": outcome.assumed,
-        "seconds": _number(outcome.seconds),
+        "seconds": finite(outcome.seconds),
         "warnings": list(warnings_of(outcome)),
     }
 
 
-def _number(value: float | None) -> float | None:
-    return float(value) if value is not None and math.isfinite(value) else None
-
-
 def _rejection_json(comparisons: tuple[Comparison, ...]) -> dict[str, Any]:
     p = smallest_p(c.misfit_p for c in comparisons)
-    return {"misfit_p": _number(p), "rejected": None if p is None else is_rejected(p)}
+    return {"misfit_p": finite(p), "rejected": None if p is None else is_rejected(p)}
 
 
 def _noise_json(kind: str, comparisons: tuple[Comparison, ...]) -> dict[str, Any]:
     shown = SHOWN[kind]
     noise = pooled_noise(comparisons)
     value = None if noise is None else noise * shown.error_factor
-    return {f"noise_floor_{shown.suffix}": _number(value), "noise_from": noise_from(comparisons)}
+    return {f"noise_floor_{shown.suffix}": finite(value), "noise_from": noise_from(comparisons)}
 
 
 def _parameter_json(estimate: Estimate, known: bool) -> dict[str, Any]:
-    combined = [_number(end) if end != 0.0 else None for end in estimate.combined]
-    low = None if estimate.low == 0.0 else _number(estimate.low)
-    high = _number(estimate.high)
+    """A parameter of the springs: 0 is no lower end, and what was not fitted may be known."""
+    fixed = estimate.is_fixed
+    combined = [finite(end) if end != 0.0 else None for end in estimate.combined]
+    low = None if estimate.low == 0.0 else finite(estimate.low)
+    shown = not fixed and (known or not estimate.free)
     return {
-        "name": estimate.name,
-        "value": _number(estimate.value),
-        "unit": estimate.unit,
-        "ci95": [low, high] if _has_interval(estimate, known) else [None, None],
-        "determined": bool(estimate.determined),
+        **_effect_number_json(estimate),
+        "ci95": [low, finite(estimate.high)] if shown else [None, None],
         "free": bool(estimate.free),
-        "systematic": _number(estimate.systematic),
-        "ci95_combined": combined if known and not estimate.is_fixed else [None, None],
-        "at_bound": bool(estimate.at_bound),
-        "note": estimate.note,
-        **_stated_json(estimate),
+        "ci95_combined": combined if known and not fixed else [None, None],
     }
-
-
-def _has_interval(estimate: Estimate, known: bool) -> bool:
-    return not estimate.is_fixed and (known or not estimate.free)
 
 
 def _stated_json(estimate: Estimate) -> dict[str, Any]:
@@ -162,14 +149,14 @@ def _comparison_json(comparison: Comparison) -> dict[str, Any]:
     e = comparison.errors
     film = comparison.kind == "film"
     measures = {
-        f"rms_{shown.suffix}": _number(e.rms * shown.error_factor),
-        "nrmse_pct": _number(e.nrmse_pct),
-        "e_rms_thesis_pct": None if film else _number(e.e_rms_thesis_pct),
-        "e_m_thesis_pct": _number(e.e_m_thesis_pct),
-        f"max_{shown.suffix}": _number(e.max * shown.error_factor),
+        f"rms_{shown.suffix}": finite(e.rms * shown.error_factor),
+        "nrmse_pct": finite(e.nrmse_pct),
+        "e_rms_thesis_pct": None if film else finite(e.e_rms_thesis_pct),
+        "e_m_thesis_pct": finite(e.e_m_thesis_pct),
+        f"max_{shown.suffix}": finite(e.max * shown.error_factor),
     }
     if film:
-        measures["peak_pct"] = _number(e.peak_pct)
+        measures["peak_pct"] = finite(e.peak_pct)
     return {
         "name": comparison.name,
         "role": comparison.role,
@@ -199,9 +186,9 @@ def _channels_json(channels: tuple[ChannelResult, ...]) -> list[dict[str, Any]]:
             "name": c.name,
             "unit": c.unit,
             "used": bool(c.used),
-            "noise": _number(c.noise),
-            "before": _number(c.before),
-            "after": _number(c.after),
+            "noise": finite(c.noise),
+            "before": finite(c.before),
+            "after": finite(c.after),
             "reason": c.reason or None,
         }
         for c in channels
@@ -224,25 +211,25 @@ def _end_json(comparison: Comparison) -> dict[str, Any] | None:
 def _published_json(published: Published | None) -> dict[str, Any] | None:
     if published is None:
         return None
-    return {"e_rms_pct": _number(published.e_rms_pct), "e_m_pct": _number(published.e_m_pct)}
+    return {"e_rms_pct": finite(published.e_rms_pct), "e_m_pct": finite(published.e_m_pct)}
 
 
 def _spring_json(candidate: SpringCandidate, kind: str) -> dict[str, Any]:
     shown = SHOWN[kind]
 
     def error(value: float | None) -> float | None:
-        return None if value is None else _number(value * shown.error_factor)
+        return None if value is None else finite(value * shown.error_factor)
 
     return {
         "spring": candidate.spring,
         "branches": int(candidate.branches),
         "free": int(candidate.free),
-        "criterion": _number(candidate.criterion),
-        "probability": _number(candidate.probability),
+        "criterion": finite(candidate.criterion),
+        "probability": finite(candidate.probability),
         f"train_rms_{shown.suffix}": error(candidate.train_rms),
         f"left_out_rms_{shown.suffix}": error(candidate.left_out_rms),
         f"validation_rms_{shown.suffix}": error(candidate.validation_rms),
-        "validation_peak_pct": _number(candidate.validation_peak_pct),
+        "validation_peak_pct": finite(candidate.validation_peak_pct),
         "chosen": bool(candidate.chosen),
     }
 
@@ -252,13 +239,13 @@ def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:
     validation = trial.validation_rms
     return {
         "branches": int(trial.branches),
-        f"train_rms_{shown.suffix}": _number(trial.train_rms * shown.error_factor),
-        "train_peak_pct": _number(trial.train_peak_pct),
+        f"train_rms_{shown.suffix}": finite(trial.train_rms * shown.error_factor),
+        "train_peak_pct": finite(trial.train_peak_pct),
         f"validation_rms_{shown.suffix}": None
         if validation is None
-        else _number(validation * shown.error_factor),
-        "validation_peak_pct": _number(trial.validation_peak_pct),
-        "bic": _number(trial.bic),
+        else finite(validation * shown.error_factor),
+        "validation_peak_pct": finite(trial.validation_peak_pct),
+        "bic": finite(trial.bic),
         "chosen": bool(trial.chosen),
     }
 
@@ -283,7 +270,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "train": _names(before.train, after.train),
             "validation": _names(before.validation, after.validation),
         },
-        f"noise_floor_{shown.suffix}": _number(outcome.noise * shown.error_factor),
+        f"noise_floor_{shown.suffix}": finite(outcome.noise * shown.error_factor),
         "noise_from": noise_from(outcome.before.train),
         "baseline": {"model": "thesis", **_stand_json(before)},
         "steps": [
@@ -315,14 +302,14 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "verdict": outcome.verdict,
         "verdict_reasons": list(outcome.judgement.reasons),
         "recommended": "final" if outcome.recommends_final else "baseline",
-        "validation_gain": _number(outcome.gain),
+        "validation_gain": finite(outcome.gain),
         "status": outcome.status,
         "events": [
             {
                 "record": c.name,
                 "kind": e.kind,
-                "at_s": _number(e.time),
-                "size": _number(e.size),
+                "at_s": finite(e.time),
+                "size": finite(e.size),
                 "unit": e.unit,
             }
             for c in (*after.train, *after.validation)
@@ -332,13 +319,13 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             {
                 "family": f,
                 "probability": p,
-                "probability_missing": _number(outcome.marginals.get(f)),
+                "probability_missing": finite(outcome.marginals.get(f)),
             }
             for f, p in outcome.families
         ],
         "channels": [_displacement_json(outcome), *_channels_json(finding.channels)],
         "evidence_by_channel": [
-            {"family": family, **{channel: _number(odds) for channel, odds in said}}
+            {"family": family, **{channel: finite(odds) for channel, odds in said}}
             for family, said in finding.channel_evidence
         ],
         "denied": [
@@ -358,8 +345,10 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "separates": list(experiment.separates),
             "sequence": experiment.sequence,
             "rivals": list(experiment.rivals),
-            "separation_over_noise": _number(experiment.separation),
-            "seconds": _number(experiment.seconds),
+            "separation_over_noise": finite(experiment.separation),
+            "seconds": finite(experiment.seconds),
+            "average": experiment.average,
+            "separation_by_channel": {n: finite(apart) for n, apart in experiment.by_channel},
         },
         "experiment_words": outcome.experiment_words,
         "excitation": _excitation_json(outcome),
@@ -392,7 +381,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "interrupted": finding.interrupted,
         "model_path": outcome.model_path,
         "simulations": int(finding.simulations),
-        "seconds": _number(outcome.seconds),
+        "seconds": finite(outcome.seconds),
     }
 
 
@@ -403,9 +392,9 @@ def _displacement_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "name": "displacement" if outcome.kind == "actuator" else "nominal_stress",
         "unit": "m" if outcome.kind == "actuator" else "Pa",
         "used": True,
-        "noise": _number(outcome.noise),
-        "before": _number(finding.baseline.train_rms),
-        "after": _number(finding.final.train_rms),
+        "noise": finite(outcome.noise),
+        "before": finite(finding.baseline.train_rms),
+        "after": finite(finding.final.train_rms),
         "reason": None,
     }
 
@@ -418,36 +407,36 @@ def _excitation_json(outcome: DiagnoseOutcome) -> dict[str, Any] | None:
     return {
         "determined": not outcome.undetermined,
         "tested": {
-            "voltage_kV": _number(tested.voltage / 1e3),
-            "rate_kV_per_s": _number(tested.rate / 1e3),
-            "from_Hz": _number(tested.low),
-            "to_Hz": _number(tested.high),
+            "voltage_kV": finite(tested.voltage / 1e3),
+            "rate_kV_per_s": finite(tested.rate / 1e3),
+            "from_Hz": finite(tested.low),
+            "to_Hz": finite(tested.high),
         },
         "records": [
             {
                 "record": asked.name,
-                "open_over_noise": _number(asked.open_rms),
-                "error_share": _number(asked.share),
-                "error_share_beyond_training": _number(asked.above),
+                "open_over_noise": finite(asked.open_rms),
+                "error_share": finite(asked.share),
+                "error_share_beyond_training": finite(asked.above),
                 "not_determined": [
                     {
-                        "from_Hz": _number(band.low),
-                        "to_Hz": _number(band.high),
-                        "asked_over_noise": _number(band.asked),
-                        "known_pct": _number(100.0 * band.known),
+                        "from_Hz": finite(band.low),
+                        "to_Hz": finite(band.high),
+                        "asked_over_noise": finite(band.asked),
+                        "known_pct": finite(100.0 * band.known),
                     }
                     for band in asked.undetermined
                 ],
             }
             for asked in outcome.excitation
         ],
-        "parameters_um": [_number(error * 1e6) for error in outcome.prediction_errors],
+        "parameters_um": [finite(error * 1e6) for error in outcome.prediction_errors],
         "record": None
         if record is None
         else {
             "name": record.name,
-            "seconds": _number(record.seconds),
-            "open_over_noise": _number(record.open_rms),
+            "seconds": finite(record.seconds),
+            "open_over_noise": finite(record.open_rms),
             "sequence": record.sequence,
         },
     }
@@ -478,12 +467,12 @@ def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, 
     shown = SHOWN[kind]
     steady = pooled_steady_rms(comparisons)
     return {
-        f"rms_{shown.suffix}": _number(errors.rms * shown.error_factor),
-        f"rms_without_events_{shown.suffix}": _number(steady * shown.error_factor),
-        "nrmse_pct": _number(errors.nrmse_pct),
-        "e_rms_thesis_pct": None if kind == "film" else _number(errors.e_rms_thesis_pct),
-        "e_m_thesis_pct": _number(errors.e_m_thesis_pct),
-        f"max_{shown.suffix}": _number(errors.max * shown.error_factor),
+        f"rms_{shown.suffix}": finite(errors.rms * shown.error_factor),
+        f"rms_without_events_{shown.suffix}": finite(steady * shown.error_factor),
+        "nrmse_pct": finite(errors.nrmse_pct),
+        "e_rms_thesis_pct": None if kind == "film" else finite(errors.e_rms_thesis_pct),
+        "e_m_thesis_pct": finite(errors.e_m_thesis_pct),
+        f"max_{shown.suffix}": finite(errors.max * shown.error_factor),
     }
 
 
@@ -496,16 +485,16 @@ def _selection_json(stage: Stage, train: tuple[Comparison, ...], kind: str) -> d
     rms = selection_rms(stage, train)
 
     def relative(of: float, known: float, value: float) -> float | None:
-        return _number(of * value / known) if known > 0.0 else None
+        return finite(of * value / known) if known > 0.0 else None
 
     return {
-        f"rms_{shown.suffix}": _number(rms * shown.error_factor),
+        f"rms_{shown.suffix}": finite(rms * shown.error_factor),
         "nrmse_pct": None if errors is None else relative(errors.nrmse_pct, errors.rms, rms),
-        "e_rms_thesis_pct": None if kind == "film" else _number(rms * 1e5),
+        "e_rms_thesis_pct": None if kind == "film" else finite(rms * 1e5),
         "e_m_thesis_pct": None
         if errors is None
         else relative(errors.e_m_thesis_pct, errors.max, stage.selection_max),
-        f"max_{shown.suffix}": _number(stage.selection_max * shown.error_factor),
+        f"max_{shown.suffix}": finite(stage.selection_max * shown.error_factor),
     }
 
 
@@ -513,12 +502,12 @@ def _effect_number_json(estimate: Estimate) -> dict[str, Any]:
     fixed = estimate.is_fixed
     return {
         "name": estimate.name,
-        "value": _number(estimate.value),
+        "value": finite(estimate.value),
         "unit": estimate.unit,
-        "ci95": [None, None] if fixed else [_number(estimate.low), _number(estimate.high)],
+        "ci95": [None, None] if fixed else [finite(estimate.low), finite(estimate.high)],
         "determined": bool(estimate.determined),
-        "systematic": _number(estimate.systematic),
-        "ci95_combined": [None, None] if fixed else [_number(end) for end in estimate.combined],
+        "systematic": finite(estimate.systematic),
+        "ci95_combined": [None, None] if fixed else [finite(end) for end in estimate.combined],
         "at_bound": bool(estimate.at_bound),
         "note": estimate.note,
         **_stated_json(estimate),
@@ -529,8 +518,8 @@ def _curve_json(curve: Curve | None) -> dict[str, Any] | None:
     if curve is None:
         return None
     return {
-        "axis": [_number(v) for v in curve.axis.tolist()],
-        "values": [_number(v) for v in curve.values.tolist()],
+        "axis": [finite(v) for v in curve.axis.tolist()],
+        "values": [finite(v) for v in curve.values.tolist()],
         "axis_label": curve.axis_label,
         "values_label": curve.values_label,
     }
@@ -539,22 +528,22 @@ def _curve_json(curve: Curve | None) -> dict[str, Any] | None:
 def _evidence_json(step: Step) -> dict[str, Any]:
     return {
         "sentences": list(step.evidence),
-        "criterion": _number(step.stage.criterion),
-        **{name: _number(value) for name, value in step.numbers},
+        "criterion": finite(step.stage.criterion),
+        **{name: finite(value) for name, value in step.numbers},
     }
 
 
 def _signature_json(signature: Signature, kind: str) -> dict[str, Any]:
     shown = SHOWN[kind]
     return {
-        f"rms_{shown.suffix}": _number(signature.rms * shown.error_factor),
-        "rms_over_noise": _number(signature.rms / signature.noise),
+        f"rms_{shown.suffix}": finite(signature.rms * shown.error_factor),
+        "rms_over_noise": finite(signature.rms / signature.noise),
         "is_noise": bool(signature.is_noise),
-        "ljung_box_p": _number(signature.ljung_box_p),
-        "runs_p": _number(signature.runs_p),
-        "noise_p": _number(signature.noise_p),
-        "correlation_time_s": _number(signature.correlation_time),
-        "explained": {d.quantity: _number(d.explained) for d in signature.dependences},
+        "ljung_box_p": finite(signature.ljung_box_p),
+        "runs_p": finite(signature.runs_p),
+        "noise_p": finite(signature.noise_p),
+        "correlation_time_s": finite(signature.correlation_time),
+        "explained": {d.quantity: finite(d.explained) for d in signature.dependences},
         "words": list(signature.words),
         "remarks": list(signature.words),
     }
@@ -569,14 +558,14 @@ def _candidate_json(candidate: Candidate, outcome: DiagnoseOutcome) -> dict[str,
         "acts_on": candidate.acts_on,
         "verdict": candidate.verdict,
         "kept": any(s.effect == candidate.effect for s in outcome.finding.steps),
-        f"train_rms_{shown.suffix}": _number(stage.train_rms * shown.error_factor),
-        f"selection_rms_{shown.suffix}": _number(stage.selection_rms * shown.error_factor),
-        "promised": _number(candidate.promised),
-        "predicted_share": _number(candidate.promised),
-        "gained": _number(candidate.gained),
-        "explained_share": _number(candidate.gained),
-        "gain": _number(candidate.gain),
-        "behind": _number(candidate.behind),
-        "criterion_behind_best": _number(candidate.behind),
+        f"train_rms_{shown.suffix}": finite(stage.train_rms * shown.error_factor),
+        f"selection_rms_{shown.suffix}": finite(stage.selection_rms * shown.error_factor),
+        "promised": finite(candidate.promised),
+        "predicted_share": finite(candidate.promised),
+        "gained": finite(candidate.gained),
+        "explained_share": finite(candidate.gained),
+        "gain": finite(candidate.gain),
+        "behind": finite(candidate.behind),
+        "criterion_behind_best": finite(candidate.behind),
         "note": candidate.note,
     }

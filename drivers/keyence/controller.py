@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import Enum
-from types import TracebackType
 from typing import TypeVar
 
 from dearig.drivers.errors import RigError
@@ -107,12 +106,7 @@ class Keyence:
     def __enter__(self) -> Keyence:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

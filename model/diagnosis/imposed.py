@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.coefficients import (
     ELECTRIC,
@@ -291,4 +291,6 @@ def _step(record: ActuatorRecord) -> float:
 
 def _smooth(values: np.ndarray, width: float, step: float) -> np.ndarray:
     # half a sample at least: a narrower kernel is none
-    return np.asarray(gaussian_filter1d(values, max(width / step, 0.5), mode="nearest"))
+    return np.asarray(
+        scipy.ndimage.gaussian_filter1d(values, max(width / step, 0.5), mode="nearest")
+    )

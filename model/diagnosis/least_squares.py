@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy  # loads its parts when they are first used, which a run may never do
 
 __all__ = ["bounded", "lagrange", "well_determined"]
 
@@ -51,14 +51,14 @@ def bounded(
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0.0] = 1.0
     wanted = np.concatenate([inside, corner[:, k]])
-    found, left = nnls(rows / scale, wanted, maxiter=30 * scale.size)
+    found, left = scipy.optimize.nnls(rows / scale, wanted, maxiter=30 * scale.size)
     found = found / scale
     a = found[springs : springs + k].copy()
     a[two_sided] -= found[springs + k :]
     held = np.clip(a, low, high)
     if np.array_equal(held, a):
         return a, float(left)
-    _, in_springs = nnls(triangle, inside + d_inside @ held)
+    _, in_springs = scipy.optimize.nnls(triangle, inside + d_inside @ held)
     return held, math.hypot(in_springs, float(np.linalg.norm(corner[:, k] + corner[:, :k] @ held)))
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 import numpy as np
-from scipy.optimize import lsq_linear, nnls
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.diagnosis.imposed import (
     ImposedActuator,
@@ -243,7 +243,7 @@ class Regression:
     def _solve(self, columns: _Columns | None) -> tuple[np.ndarray, float]:
         """Return coefficients within their limits, and the norm of the misfit."""
         if columns is None:
-            _, left = nnls(self._triangle, self._inside)
+            _, left = scipy.optimize.nnls(self._triangle, self._inside)
             return np.zeros(0), math.hypot(left, float(np.linalg.norm(self._outside)))
         c = columns
         return bounded(self._triangle, self._inside, self._outside, c.inside, c.outside, *c.limits)
@@ -399,7 +399,7 @@ class Regression:
             u, inverse = self._directions
             beyond = rows - (rows @ u) @ u.T
             left = self._residuals - u @ (u.T @ self._residuals)
-            a = lsq_linear(beyond.T, -left, (low, high)).x
+            a = scipy.optimize.lsq_linear(beyond.T, -left, (low, high)).x
             step = -inverse @ (u.T @ (self._residuals + a @ rows))
         return columns.values(a), step
 
@@ -409,12 +409,12 @@ class Regression:
         """Return moduli (1 + n,) and times (n,) of the best set of branches that explain (M,)."""
         count = len(self.model.network.branches)
         inside = self._q.T @ wanted
-        weights, _ = nnls(self._triangle, inside)
+        weights, _ = scipy.optimize.nnls(self._triangle, inside)
         used = weights[1:] + 0.5 * (np.roll(weights[1:], 1) + np.roll(weights[1:], -1))
         pool = sorted(np.argsort(-used)[: max(_BRANCH_POOL, count)])
         best, chosen, moduli = math.inf, tuple(pool[:count]), np.zeros(1 + count)
         for some in combinations(pool, count):
-            mu, left = nnls(self._triangle[:, [0, *(1 + i for i in some)]], inside)
+            mu, left = scipy.optimize.nnls(self._triangle[:, [0, *(1 + i for i in some)]], inside)
             if left < best:
                 best, chosen, moduli = left, some, mu
         moduli, times = self._polished(moduli, np.log(self.grid[list(chosen)]), inside)
@@ -433,7 +433,7 @@ class Regression:
         kept = (moduli, log_times)
         for _ in range(_POLISHING):
             parts, slopes = self._between_nodes(log_times)
-            moduli, left = nnls(parts, inside)
+            moduli, left = scipy.optimize.nnls(parts, inside)
             if left < best:
                 best, kept = left, (moduli, log_times)
             jacobian = np.hstack([parts, slopes * moduli[1:]])

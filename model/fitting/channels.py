@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from threading import Lock
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.circuit import loop
 from dearig.model.coefficients import CAPACITANCE, HELD, LENGTH
@@ -157,7 +157,7 @@ class _Circuit:
         stretch = rest + record.displacement / c[LENGTH]
         stretch[: max(record.lead_in, 1)] = rest
         width = max(_SMOOTHING / self.step, 0.5)
-        self._stretch = np.asarray(gaussian_filter1d(stretch, width, mode="nearest"))
+        self._stretch = np.asarray(scipy.ndimage.gaussian_filter1d(stretch, width, mode="nearest"))
         late = 0.5 * self.step if drive.hold and not record.means else 0.0
         self.time = self.means(drive.time)
         self._thin = Drive(

@@ -8,7 +8,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model import kernel
 from dearig.model.errors import ModelError
@@ -340,7 +340,7 @@ def _prior_p(problem: Problem, fit: LocalFit, held_limits: Sequence[str]) -> flo
     size, axes = np.linalg.eigh(rest)
     told = size > _PRIOR_TOLD
     far = (axes.T @ rows)[told] ** 2 / size[told]
-    return float(chdtrc(int(told.sum()), float(far.sum()))) if told.any() else 1.0
+    return float(scipy.special.chdtrc(int(told.sum()), float(far.sum()))) if told.any() else 1.0
 
 
 def _farthest(layout: FitLayout, rows: np.ndarray) -> str:

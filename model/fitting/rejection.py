@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc, kolmogorov, ndtr
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.fitting.intervals import (
     correlation_end,
@@ -73,13 +73,13 @@ def noise_test(
     still = np.zeros(0) if rest is None else rest[np.isfinite(rest)]
     if still.size < REST_MIN or np.ptp(still) == 0.0:
         away, lines = spectrum_distance(left)
-        spectrum = float(kolmogorov(away * math.sqrt(lines)))
+        spectrum = float(scipy.special.kolmogorov(away * math.sqrt(lines)))
         return NoiseTest(None, spectrum, _ljung_box(left), _runs(left))
     still = still - still.mean()
     variance = float(np.mean(still**2))
     kurtosis = max(float(np.mean(still**4)) / variance**2, 1.0)
     apart = max(correlation_time(still), 1.0) * max(kurtosis - 1.0, 2.0) / 2.0
-    size = fdtrc(
+    size = scipy.special.fdtrc(
         left.size / apart, max(still.size / apart - 1.0, 1.0), float(np.mean(left**2)) / variance
     )
     white = not averaged and is_flat(still)
@@ -88,7 +88,7 @@ def noise_test(
     every = 1 if white else 2 * correlation_end(still)
     return NoiseTest(
         float(size),
-        float(kolmogorov(away * math.sqrt(lines))),
+        float(scipy.special.kolmogorov(away * math.sqrt(lines))),
         _ljung_box(left[::every]),
         _runs(left[::every]),
         1.0 if white else max(correlation_time(still), 1.0),
@@ -118,7 +118,7 @@ def _ljung_box(residual: np.ndarray) -> float:
         return 1.0
     r = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / total
     statistic = n * (n + 2.0) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
-    return float(chdtrc(lags, statistic))
+    return float(scipy.special.chdtrc(lags, statistic))
 
 
 def _runs(residual: np.ndarray) -> float:
@@ -132,4 +132,4 @@ def _runs(residual: np.ndarray) -> float:
     runs = 1 + int(np.count_nonzero(up[1:] != up[:-1]))
     mean = 1.0 + 2.0 * a * b / (a + b)
     variance = (mean - 1.0) * (mean - 2.0) / (a + b - 1.0)
-    return float(ndtr((runs - mean) / math.sqrt(variance)))
+    return float(scipy.special.ndtr((runs - mean) / math.sqrt(variance)))

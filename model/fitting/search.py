@@ -6,15 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb, inf
+from typing import Any
 
 import numpy as np
-from scipy.optimize import (
-    OptimizeResult,
-    differential_evolution,
-    linear_sum_assignment,
-    lsq_linear,
-    nnls,
-)
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model import kernel
 from dearig.model.coefficients import ELECTRIC, MODULUS
@@ -94,13 +89,13 @@ def algorithm_1(
 
     generation = 0
 
-    def watch(intermediate_result: OptimizeResult) -> bool:
+    def watch(intermediate_result: Any) -> bool:
         nonlocal generation
         generation += 1
         progress("differential evolution", generation / settings.generations)
         return bool(intermediate_result.fun * 1e3 < settings.stop)
 
-    result = differential_evolution(
+    result = scipy.optimize.differential_evolution(
         cost,
         bounds,
         strategy="rand1bin",
@@ -189,7 +184,7 @@ def _at_rest_balance(
         progress("global search", (turn + 1) / (_REST_ITERATIONS + 1))
         if measured is not None:
             break
-        moduli, _ = nnls(parts.T, target)
+        moduli, _ = scipy.optimize.nnls(parts.T, target)
         if moduli[0] <= 0.0:
             break
         c[HEAD + MODULUS] = np.clip(moduli[0], *_modulus_ranges(layout)[0])
@@ -321,12 +316,14 @@ def _fitted_moduli(
 ) -> tuple[np.ndarray, float]:
     """Return the moduli (n,) within ``ranges`` (n, 2) of least squares, and their misfit."""
     if not ranges[:, 0].any() and np.isinf(ranges[:, 1]).all():
-        return nnls(parts, target)
+        return scipy.optimize.nnls(parts, target)
     low, high = ranges.T
     moduli, free = low.copy(), low < high
     if free.any():
         left = target - parts[:, ~free] @ moduli[~free]
-        moduli[free] = lsq_linear(parts[:, free], left, (low[free], high[free]), method="bvls").x
+        moduli[free] = scipy.optimize.lsq_linear(
+            parts[:, free], left, (low[free], high[free]), method="bvls"
+        ).x
     return moduli, float(np.linalg.norm(parts @ moduli - target))
 
 
@@ -346,7 +343,7 @@ def _slots(layout: FitLayout, times: np.ndarray) -> np.ndarray | None:
     for row, q in enumerate(quantities):
         if q.constraint is not None and q.constraint.mean is not None:
             away[row] = np.abs(x - np.log(np.maximum(q.constraint.mean, 1e-300)))
-    _, taken = linear_sum_assignment(_OUT * (beyond > _TIME_ERROR) + away)
+    _, taken = scipy.optimize.linear_sum_assignment(_OUT * (beyond > _TIME_ERROR) + away)
     return taken if not (beyond[np.arange(x.size), taken] > _TIME_ERROR).any() else None
 
 
@@ -388,7 +385,7 @@ def _subsets(
     triangle = np.asarray(np.linalg.qr(np.vstack([parts, target]).T, mode="r"))
     pool = list(range(len(candidates)))
     if comb(len(pool), branches) > _SETS_MAX:
-        used, _ = nnls(triangle[:, :-1], triangle[:, -1])
+        used, _ = scipy.optimize.nnls(triangle[:, :-1], triangle[:, -1])
         weights = used[1:] + 0.5 * (np.roll(used[1:], 1) + np.roll(used[1:], -1))
         order = [int(i) for i in np.argsort(-weights, kind="stable")]
         keep = branches

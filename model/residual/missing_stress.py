@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
 from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, assembly
@@ -94,9 +94,17 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
     width = SMOOTHING / step
 
     def lacking(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        stretch = rest + gaussian_filter1d(displacement, width, mode="nearest") / length
-        rate = gaussian_filter1d(displacement, width, order=1, mode="nearest") / (length * step)
-        bend = gaussian_filter1d(displacement, width, order=2, mode="nearest") / length / step**2
+        stretch = (
+            rest + scipy.ndimage.gaussian_filter1d(displacement, width, mode="nearest") / length
+        )
+        rate = scipy.ndimage.gaussian_filter1d(displacement, width, order=1, mode="nearest") / (
+            length * step
+        )
+        bend = (
+            scipy.ndimage.gaussian_filter1d(displacement, width, order=2, mode="nearest")
+            / length
+            / step**2
+        )
         stretch[0] = rest
         parts, _, _ = unit_stresses(c, time, stretch)
         network = c[HEAD + MODULUS :: WIDTH] @ parts
@@ -108,7 +116,7 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
     measured, stretch, rate = lacking(response.displacement + residual)
     predicted, there, _ = lacking(response.displacement)
     late = np.interp(time - record.lag, time, record.drive.voltage)
-    maxwell = c[ELECTRIC] * gaussian_filter1d(late**2, width, mode="nearest")
+    maxwell = c[ELECTRIC] * scipy.ndimage.gaussian_filter1d(late**2, width, mode="nearest")
     thrust = thinning(model.film.held, stretch) - thinning(model.film.held, there)
     return MissingStress(
         record=record.name,

@@ -13,16 +13,19 @@ from dearig.acquisition.plan import plan
 from dearig.analysis import experiment
 from dearig.analysis.experiment import (
     SEPARATES,
+    averaging,
     candidates,
     experiment_of,
     separating_experiment,
 )
 from dearig.analysis.readings.compatibility import of_rig
+from dearig.analysis.readings.rig_channels import RigChannels
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.interlocks import would_trip
 from dearig.drivers.settings import CardSettings
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load
+from dearig.model.readings.channels import ChannelRecord
 from dearig.model.simulation.actuator import Actuator, Drive
 from tests.deep import mostly_deep
 from tests.tools.diagnosis import RIVAL, finding
@@ -190,3 +193,32 @@ def test_there_is_never_nothing_to_separate_under_a_rejected_model():
         assert proposed is None
         assert "nothing to separate" not in words
         assert "record other amplitudes" in words
+
+
+#: Of the amplifier's current monitor: noise of one conversion in A.
+CURRENT = ChannelRecord("current", "A", np.zeros(0), 4e-6, skew=2e-6)
+LEAK = with_effect("leakage", loss=0.02, growth=2.0, exponent=1.0)
+
+
+@pytest.mark.parametrize("usual", [1, 100])
+def test_the_current_separates_what_a_poor_laser_does_not(usual):
+    saturated = with_effect("amplifier saturation", loss=0.02, exponent=3.0)
+    rivals = [("leakage", "leakage", LEAK), ("saturation", "amplifier", saturated)]
+    rig, noise = averaging(SLOW, usual), 100.0 * NOISE
+    alone, why = separating_experiment(rivals, rig, noise)
+    assert alone is None, "the displacement alone does not separate them"
+    assert "times the noise" in why
+    found, words = separating_experiment(rivals, rig, noise, RigChannels((CURRENT,), usual))
+    told = dict(found.by_channel)
+    assert found.separation > SEPARATES > told["displacement"]
+    assert told["current"] > 5.0
+    # an instant sees nothing of how a film charges: a wire that is off would read the same
+    assert found.average == 100
+    assert ("recorded with [card] average = 100" in words) == (usual == 1)
+    assert "The current tells most" in words
+
+
+def test_channels_change_nothing_where_there_are_none():
+    with_none = separating_experiment(RIVALS, SLOW, NOISE, RigChannels(()))
+    assert with_none == separating_experiment(RIVALS, SLOW, NOISE)
+    assert with_none[0].by_channel == (("displacement", with_none[0].separation),)

@@ -1,17 +1,18 @@
 """How long an identification takes: hybrid beside Algorithm 1, and this revision beside another.
 
-Run as ``python -m tests.benchmarks.bench_identify [PYTHON [commands]]``. Without an argument: one
-period of the thesis's identification record at its 10 ms sampling, made by Table 3's film, with
-1 um noise. Algorithm 1 as printed runs once for each of three seeds, the hybrid three times;
-medians, on a machine that may have other work.
+Run as ``python -m tests.benchmarks.bench_identify [PYTHON [commands [SEED ...]]]``. Without an
+argument: one period of the thesis's identification record at its 10 ms sampling, made by Table 3's
+film, with 1 um noise. Algorithm 1 as printed runs once for each of three seeds, the hybrid three
+times; medians, on a machine that may have other work.
 
 ``PYTHON`` is the interpreter of another checkout's environment. Then the two take turns, each in a
 process of its own, on one thread: the thesis's record of two periods and of five at 1 kHz, with
 intervals and without. Processor seconds, ratios turn by turn, and the costs that are reached.
 
-With ``commands`` whole commands take turns, once each: recordings of simulated rigs, made by the
-other, are identified, and diagnosed with a validation recording. This works with revisions whose
-modules have other names. Both have to have compiled their kernels.
+With ``commands`` whole commands take turns, once each: recordings of simulated rigs, those of
+``RIGS`` or of the seeds, made by the other, are identified, and diagnosed with a validation
+recording. This works with revisions whose modules have other names. Both have to have compiled
+their kernels.
 """
 
 import json
@@ -22,7 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -31,8 +32,8 @@ from dearig.model.fitting import Identification, identify
 from dearig.model.fitting.search import ALGORITHM_1
 from dearig.model.readings.measures import errors
 from dearig.model.readings.records import ActuatorRecord
+from dearig.model.simulation import excitation
 from dearig.model.simulation.actuator import Actuator, Drive
-from dearig.model.simulation.excitation import Sequence
 
 NOISE = 1e-6
 STEP = 0.01
@@ -44,7 +45,7 @@ def measured() -> dict[str, tuple[float, float]]:
     actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
 
     def record(periods: int, rate: float) -> ActuatorRecord:
-        drive = Drive(*Sequence.thesis(periods=periods).sample(rate), hold=True)
+        drive = Drive(*excitation.Sequence.thesis(periods=periods).sample(rate), hold=True)
         noise = NOISE * np.random.default_rng(0).standard_normal(drive.time.size)
         moved = actuator.simulate(drive).displacement
         return ActuatorRecord("made", drive, moved + noise, NOISE)
@@ -98,11 +99,11 @@ def command(interpreter: str, folder: str, *words: str) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def commands_beside(other: str) -> None:
+def commands_beside(other: str, rigs: Sequence[int]) -> None:
     """Print what whole commands of the interpreter ``other`` and of this one take, in turns."""
     print("| command | other (s) | this (s) | ratio |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        for seed in RIGS:
+        for seed in rigs:
             train, check = f"thesis-{seed}.h5", f"check-{seed}.h5"
             command(other, folder, "record", "thesis", "--rig", f"sim:{seed}", "--out", train)
             command(
@@ -120,7 +121,7 @@ def commands_beside(other: str) -> None:
 
 def main() -> None:
     actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
-    segment = Sequence.thesis(periods=1).segments[0]
+    segment = excitation.Sequence.thesis(periods=1).segments[0]
     t = np.arange(round(segment.duration / STEP) + 1) * STEP
     drive = Drive(t, segment.voltage(t))
     clean = actuator.simulate(drive).displacement
@@ -159,8 +160,8 @@ def main() -> None:
 if __name__ == "__main__":
     if sys.argv[1:] == ["measure"]:
         print(json.dumps(measured()))
-    elif sys.argv[2:] == ["commands"]:
-        commands_beside(sys.argv[1])
+    elif sys.argv[2:3] == ["commands"]:
+        commands_beside(sys.argv[1], [int(seed) for seed in sys.argv[3:]] or RIGS)
     elif sys.argv[1:]:
         beside(sys.argv[1])
     else:

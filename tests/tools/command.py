@@ -11,11 +11,13 @@ import sys
 import threading
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+import typer.main
 
 from dearig.acquisition import interrupts
 from dearig.cli.main import main
@@ -63,6 +65,10 @@ class Answer:
         return strict_json(self.out)
 
 
+#: Builds the commands once: a process of the program does so once too, in 70 ms.
+_built = cache(typer.main.get_command)
+
+
 def dearig(*arguments: str | Path) -> Answer:
     """Run the command in this process. An unexpected error is raised here, not only logged."""
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", newline="\n") for _ in range(2))
@@ -72,6 +78,7 @@ def dearig(*arguments: str | Path) -> Answer:
     with (
         patch.object(sys, "argv", argv), redirect_stdout(out), redirect_stderr(err), unexpected,
         patch.object(interrupts, "_ends_program", False),
+        patch.object(typer.main, "get_command", _built),
     ):  # fmt: skip
         try:
             main()

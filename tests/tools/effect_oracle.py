@@ -591,6 +591,18 @@ def extra(name, p, film, drive):
         "general field-dependent permittivity": by_field,
         "general friction": lambda: elements(6, 2.2),
         "general hysteresis": lambda: elements(10, 1.7),
+        "general load curve": lambda: Extra(
+            stress=lambda t, lam, u, z, v: curve_of(lam - rest, *evenly("gained"))
+        ),
+        "guide friction": lambda: Extra(
+            stress=lambda t, lam, u, z, v: (
+                max(p["friction"] + p["growth"] * (lam - rest), 0.0)
+                / (1.0 + p["rate"] / abs(u))
+                * math.copysign(1.0, u)
+                if u
+                else 0.0
+            )
+        ),
         "general polarisation": general_polarisation,
         "general softening": general_softening,
         "general strain-dependent permittivity": lambda: Extra(
@@ -617,6 +629,11 @@ def extra(name, p, film, drive):
         "self-heating": lambda: Extra(
             states=1,
             soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * z[0],
+            slopes=lambda t, lam, u, z, v: (((v / 5e3) ** 2 - z[0]) / p["time_constant"],),
+        ),
+        "heated permittivity": lambda: Extra(
+            states=1,
+            electric=lambda t, lam, u, z, v: 1.0 + p["change"] * z[0],
             slopes=lambda t, lam, u, z, v: (((v / 5e3) ** 2 - z[0]) / p["time_constant"],),
         ),
         "loss heating": lambda: Extra(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_banded
+import scipy  # loads its parts when they are first used, which a run may never do
 
 from dearig.analysis.readings.channels import electric_of
 from dearig.analysis.readings.early_ends import choose
@@ -235,7 +235,7 @@ def _with_means(means: np.ndarray) -> np.ndarray:
     bands = np.full((3, means.size), 0.125)
     bands[1] = 0.75
     bands[1, [0, -1]] = 0.875  # beyond the ends it stands still
-    return np.asarray(solve_banded((1, 1), bands, means))
+    return np.asarray(scipy.linalg.solve_banded((1, 1), bands, means))
 
 
 def noise_texts(readings: Iterable[Readings]) -> list[str]:

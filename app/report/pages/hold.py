@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dearig.recording.json_file import finite
 from dearig.report.figures.defaults import style
 from dearig.report.figures.style import DRIVE, MEASURED, NOISE, WIDTH, blank, few_ticks
 from dearig.report.text.numbers import seconds, significant
@@ -87,16 +88,16 @@ def hold_json(outcome: HoldOutcome) -> dict[str, Any]:
         "seconds": outcome.duration,
         "rig": outcome.address,
         "model": outcome.model.name,
-        "noise_floor_um": _number(outcome.noise * _UM),
-        "rms_um": _number(outcome.rms * _UM),
-        "max_um": _number(outcome.largest * _UM),
+        "noise_floor_um": finite(outcome.noise * _UM),
+        "rms_um": finite(outcome.rms * _UM),
+        "max_um": finite(outcome.largest * _UM),
         "settled_s": outcome.settled,
-        "settled_rms_um": _number(outcome.settled_rms * _UM),
+        "settled_rms_um": finite(outcome.settled_rms * _UM),
         "minutes": [
             {
                 "end_s": float(end),
-                "error_um": _number(float(error) * _UM),
-                "correction_pct": _number(float(correction) * 100.0),
+                "error_um": finite(float(error) * _UM),
+                "correction_pct": finite(float(correction) * 100.0),
             }
             for end, error, correction in np.atleast_2d(outcome.minutes)
         ],
@@ -105,7 +106,7 @@ def hold_json(outcome: HoldOutcome) -> dict[str, Any]:
         else {
             "answers": done.answers,
             "delay_s": done.delay,
-            "least_waiting_s": _number(done.waiting),
+            "least_waiting_s": finite(done.waiting),
             "correction_lowest_pct": done.lowest * 100.0,
             "correction_highest_pct": done.highest * 100.0,
             "correction_last_pct": done.last * 100.0,
@@ -120,7 +121,3 @@ def hold_json(outcome: HoldOutcome) -> dict[str, Any]:
         "margins": [asdict(margin) for margin in run.margins],
         "warnings": list(outcome.warnings),
     }
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -11,6 +11,7 @@ import numpy as np
 
 from dearig.analysis.decimate import decimate
 from dearig.analysis.track_target import missed_parts
+from dearig.recording.json_file import finite
 from dearig.report.figures.defaults import style
 from dearig.report.figures.style import (
     COLUMNS,
@@ -262,7 +263,7 @@ def track_json(outcome: TrackOutcome) -> dict[str, Any]:
         },
         "rig": outcome.rig,
         "model": outcome.model.name,
-        "noise_floor_um": _number(outcome.noise * _UM),
+        "noise_floor_um": finite(outcome.noise * _UM),
         "feasible": outcome.feasible,
         "within_um": outcome.within * _UM,
         "unreachable": [
@@ -271,8 +272,8 @@ def track_json(outcome: TrackOutcome) -> dict[str, Any]:
                 "stop_s": part.stop,
                 "cause": part.cause,
                 "worst_um": part.worst * _UM,
-                "needed_kV": _number(part.needed * 1e-3),
-                "allowed_kV": _number(part.allowed * 1e-3),
+                "needed_kV": finite(part.needed * 1e-3),
+                "allowed_kV": finite(part.allowed * 1e-3),
             }
             for part in found.unreachable
         ],
@@ -280,12 +281,12 @@ def track_json(outcome: TrackOutcome) -> dict[str, Any]:
             {
                 "kind": run.kind,
                 "iteration": run.iteration,
-                "rms_um": _number(run.rms * _UM),
-                "max_um": _number(run.largest * _UM),
+                "rms_um": finite(run.rms * _UM),
+                "max_um": finite(run.largest * _UM),
                 "samples": run.samples,
                 "recording": str(run.recording),
-                "learned_up_to_Hz": _number(run.edge) if run.edge > 0.0 else None,
-                "contraction": _number(run.contraction),
+                "learned_up_to_Hz": finite(run.edge) if run.edge > 0.0 else None,
+                "contraction": finite(run.contraction),
                 "notes": list(run.notes),
             }
             for run in outcome.runs
@@ -360,7 +361,3 @@ def _shade(ax: Axes, outcome: TrackOutcome) -> None:
 
 def _um(metres: float) -> str:
     return significant(metres * _UM)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

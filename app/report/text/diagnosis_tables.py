@@ -242,6 +242,6 @@ def experiment_table(outcome: DiagnoseOutcome) -> Table | None:
     head = (("Excitation", ""), ("Separation", "/ noise"), ("Duration", ""))
     note = (
         "Separation: RMS difference between the predictions of the two most similar rivals, "
-        "divided by the noise floor."
+        "divided by the noise floor. What electrical channels tell counts as more of it."
     )
     return Table("Excitations considered", head, rows, note)

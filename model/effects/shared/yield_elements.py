@@ -7,23 +7,11 @@ stretch at the last step (Visintin, Differential Models of Hysteresis, 1994).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve
 
-__all__ = ["carry", "first_loading", "pull", "slope"]
-
-
-def first_loading(values: Mapping[str, float], count: int, ratio: float) -> Curve:
-    """Return the first loading, from which every loop follows by Masing's rules."""
-    thresholds = values["reach"] * ratio ** -np.arange(count - 1.0, -1.0, -1.0)
-    stretch = np.concatenate(([0.0], np.geomspace(0.3 * thresholds[0], thresholds[-1], 60)))
-    yields = np.array([values[f"yield_{i + 1}"] for i in range(count)])
-    stress_Pa = np.minimum(stretch[:, None] / thresholds, 1.0) @ yields
-    return Curve(stretch, stress_Pa, "change of stretch", "stress of first loading (Pa)")
+__all__ = ["carry", "pull", "slope"]
 
 
 @jit

@@ -96,10 +96,6 @@ def _set_divisor(asked: Asked, value: int) -> None:
     asked.device.timing.change_clock(asked.own, rate=_timebase(asked) / value)
 
 
-def _input_only(asked: Asked) -> object:
-    return asked.of_kind(Kind.AI)
-
-
 def _output_only(asked: Asked) -> object:
     return asked.of_kind(Kind.AO)
 

@@ -378,6 +378,12 @@ SHOWN = {
         * (np.power(1.0 + t / p["onset"], p["exponent"]) - 1.0)
         / (np.power(1.0 + 30.0 / p["onset"], p["exponent"]) - 1.0)
     ),
+    "swinging load": lambda p, t: (
+        moved(t)[0]
+        - p["cosine"]
+        + np.exp(-t / p["decay_time"])
+        * np.real((p["cosine"] - 1j * p["sine"]) * np.exp(2j * np.pi * p["frequency"] * t))
+    ),
     "sensor double lag": shown_by_two_lags,
     "fitful drift": shown_by_walk,
     "sudden change of reading": lambda p, t: (

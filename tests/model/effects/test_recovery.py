@@ -39,6 +39,7 @@ LARGER = {
     "slowing warm-up": 10.0,
     "leakage": 1.5,
     "self-heating": 3.0,
+    "heated permittivity": 3.0,
     "self-heating in stages": 10.0,
     "linear drift": 3.0,
     "settling drift": 3.0,
@@ -70,7 +71,12 @@ IN_FILMS = {
 # ages below the interval of two readings are not told apart
 IN_ACTUATORS = {"general sensor lag": {"age": 1.0 / RATE}}
 # a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
-NEARER = {"mains interference": 1.00005, "vibration": 1.00005, "sensor ripple": 1.05}
+NEARER = {
+    "mains interference": 1.00005,
+    "vibration": 1.00005,
+    "swinging load": 1.002,
+    "sensor ripple": 1.05,
+}
 NEARER |= dict.fromkeys(("amplifier limit", "sensor saturation"), 0.8)
 NEARER |= dict.fromkeys(
     (

@@ -7,70 +7,49 @@ before. Their moduli are the weights. A branch between two nodes is met to (ln 2
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-
-import numpy as np
 
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Law, Parameter
+from dearig.model.effects.description import Parameter
 from dearig.model.effects.shared.filters import lagged
+from dearig.model.effects.shared.general import Axis, Relaxations, Weights, general
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
 _BRANCHES = 10
 _RATIO = 2.0  # of neighbouring relaxation times
 
-
-def _relaxation(values: Mapping[str, float]) -> Curve:
-    """Return the relaxation modulus over time."""
-    times = values["relaxation_time"] * _RATIO ** np.arange(float(_BRANCHES))
-    time = np.geomspace(0.1 * times[0], times[-1], 60)
-    moduli = np.array([values[f"modulus_{i + 1}"] for i in range(_BRANCHES)])
-    return Curve(
-        time, np.exp(-time[:, None] / times) @ moduli, "time (s)", "relaxation modulus (Pa)"
-    )
-
-
-EFFECT = Effect(
+EFFECT = general(
     name="general creep",
     family="creep",
     acts_on="film stress",
     summary="the film creeps over seconds to minutes, with relaxation times of any distribution",
-    law=Law(
-        equations=(
-            r"\sigma = \sigma_0 + \frac{\lambda_0}{\lambda} \sum_{i=1}^{10} \mu_i (e - q_i)",
-            r"\dot{q}_i = \frac{\lambda_0}{\lambda} \frac{e - q_i}{2^{i - 1}\,T}",
-            r"e = \ln\frac{\lambda}{\lambda_0}",
-        ),
-        symbols=(*(f"\\mu_{{{i}}}" for i in range(1, 11)), "T"),
-        source="J. C. Maxwell, Phil. Trans. R. Soc. 157, 49 (1867), as a Prony series",
-        where=(
-            ("e", "logarithmic strain from rest"),
-            ("q_i", "internal strain of branch i"),
-            (r"\mu_i", "modulus of branch i"),
-        ),
+    equations=(
+        r"\sigma = \sigma_0 + \frac{\lambda_0}{\lambda} \sum_{i=1}^{10} \mu_i (e - q_i)",
+        r"\dot{q}_i = \frac{\lambda_0}{\lambda} \frac{e - q_i}{2^{i - 1}\,T}",
+        r"e = \ln\frac{\lambda}{\lambda_0}",
     ),
-    parameters=(
-        *(
-            Parameter(f"modulus_{i + 1}", "Pa", (0.0, 1e7), f"of branch {i + 1}", 300.0, 0.0)
-            for i in range(_BRANCHES)
-        ),
+    source="J. C. Maxwell, Phil. Trans. R. Soc. 157, 49 (1867), as a Prony series",
+    shapes=Relaxations(
+        _BRANCHES,
+        _RATIO,
+        (("e", "logarithmic strain from rest"), ("q_i", "internal strain of branch i")),
+    ),
+    weights=Weights(
+        "modulus", r"\mu", "Pa", (0.0, 1e7), "of branch", 300.0, stands_for="modulus of branch i"
+    ),
+    scale=(
         Parameter(
-            "relaxation_time",
-            "s",
-            (0.05, 100.0),
-            "of the first branch",
-            0.8,
-            starts=(0.8, 0.1),
-            logarithmic=True,
+            "relaxation_time", "s", (0.05, 100.0), "of the first branch", 0.8,
+            starts=(0.8, 0.1), logarithmic=True,
         ),
+        "T",
     ),
+    over=Axis("time (s)"),
+    shows=Axis("relaxation modulus (Pa)"),
     memory=_BRANCHES,
     drives=("voltage", "stretch"),
-    is_general=True,
-    curve=_relaxation,
-)
+)  # fmt: skip
 
 
 @jit

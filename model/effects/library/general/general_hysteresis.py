@@ -8,64 +8,45 @@ a straight line.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Law, Parameter
-from dearig.model.effects.shared.yield_elements import carry, first_loading, pull, slope
+from dearig.model.effects.description import Parameter
+from dearig.model.effects.shared.general import Axis, Elements, Weights, general
+from dearig.model.effects.shared.yield_elements import carry, pull, slope
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
 _ELEMENTS = 10
 _RATIO = 1.7  # of neighbouring thresholds
 
-
-def _loading(values: Mapping[str, float]) -> Curve:
-    return first_loading(values, _ELEMENTS, _RATIO)
-
-
-EFFECT = Effect(
+EFFECT = general(
     name="general hysteresis",
     family="rate_independent_hysteresis",
     acts_on="film stress",
     summary="hysteresis loops of any form, at any speed",
-    law=Law(
-        equations=(
-            r"\sigma = \sigma_0 + \sum_{i=1}^{10} Y_i \frac{z_i}{s_i}",
-            r"\dot{z}_i = \dot{\lambda} \quad \mathrm{within} \quad |z_i| \le s_i",
-            r"s_i = 1.7^{i - 10}\,r",
-        ),
-        symbols=(*(f"Y_{{{i}}}" for i in range(1, 11)), "r"),
-        source="A. Visintin, Differential Models of Hysteresis (1994)",
-        where=(
-            ("z_i", "stretch of element i, which yields at its threshold"),
-            ("s_i", "threshold of element i"),
-            ("Y_i", "yield stress of element i"),
-        ),
+    equations=(
+        r"\sigma = \sigma_0 + \sum_{i=1}^{10} Y_i \frac{z_i}{s_i}",
+        r"\dot{z}_i = \dot{\lambda} \quad \mathrm{within} \quad |z_i| \le s_i",
+        r"s_i = 1.7^{i - 10}\,r",
     ),
-    parameters=(
-        *(
-            Parameter(
-                f"yield_{i + 1}", "Pa", (0.0, 1e5), f"yield stress of element {i + 1}", 15.0, 0.0
-            )
-            for i in range(_ELEMENTS)
-        ),
+    source="A. Visintin, Differential Models of Hysteresis (1994)",
+    shapes=Elements(_ELEMENTS, _RATIO),
+    weights=Weights(
+        "yield", "Y", "Pa", (0.0, 1e5), "yield stress of element", 15.0,
+        stands_for="yield stress of element i",
+    ),
+    scale=(
         Parameter(
-            "reach",
-            "",
-            (1e-3, 4.0),
-            "change of stretch at which the last element yields",
-            2.4e-2,
-            starts=(2.4e-2, 1.0),
-            logarithmic=True,
+            "reach", "", (1e-3, 4.0), "change of stretch at which the last element yields", 2.4e-2,
+            starts=(2.4e-2, 1.0), logarithmic=True,
         ),
+        "r",
     ),
+    over=Axis("change of stretch"),
+    shows=Axis("stress of first loading (Pa)"),
     memory=_ELEMENTS,
     drives=("voltage", "stretch"),
     is_hysteretic=True,
-    is_general=True,
-    curve=_loading,
-)
+)  # fmt: skip
 
 
 @jit

@@ -6,64 +6,45 @@ strengths are the weights; the force is linear in them: eps V (V + sum d_i (u_i 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Curve, Effect, Law, Parameter
+from dearig.model.effects.description import Parameter
 from dearig.model.effects.library.electric.dielectric_relaxation import SETTLED
 from dearig.model.effects.shared.filters import lagged
+from dearig.model.effects.shared.general import Axis, Relaxations, Weights, general
 
 __all__ = ["EFFECT", "polarise"]
 
 _TERMS = 8
 _RATIO = 3.0  # of neighbouring relaxation times
 
-
-def _response(values: Mapping[str, float]) -> Curve:
-    """Return the slow part of the permittivity after a step of the field."""
-    times = values["relaxation_time"] * _RATIO ** np.arange(float(_TERMS))
-    time = np.geomspace(0.1 * times[0], times[-1], 60)
-    strengths = np.array([values[f"strength_{i + 1}"] for i in range(_TERMS)])
-    slow = -np.expm1(-time[:, None] / times) @ strengths
-    return Curve(time, slow, "time after a step (s)", "slow part of the permittivity")
-
-
-EFFECT = Effect(
+EFFECT = general(
     name="general polarisation",
     family="dielectric_relaxation",
     acts_on="dielectric",
     summary="part of the force follows the voltage late, with times of any distribution",
-    law=Law(
-        equations=(
-            r"V_E^2 = V \left(V + \sum_{i=1}^{8} d_i (u_i - g V)\right)",
-            r"3^{i - 1}\,T \dot{u}_i = V - u_i",
-        ),
-        symbols=(*(f"d_{i}" for i in range(1, 9)), "T", "g"),
-        source="a Prony series of P. Debye's terms, Polar Molecules (1929)",
-        where=(("u_i", "slow polarisation of term i, as a voltage"), ("d_i", "strength of term i")),
+    equations=(
+        r"V_E^2 = V \left(V + \sum_{i=1}^{8} d_i (u_i - g V)\right)",
+        r"3^{i - 1}\,T \dot{u}_i = V - u_i",
     ),
-    parameters=(
-        *(
-            Parameter(f"strength_{i + 1}", "", (0.0, 1.0), f"of term {i + 1}", 3e-3, 0.0)
-            for i in range(_TERMS)
-        ),
+    source="a Prony series of P. Debye's terms, Polar Molecules (1929)",
+    shapes=Relaxations(
+        _TERMS, _RATIO, (("u_i", "slow polarisation of term i, as a voltage"),), is_rising=True
+    ),
+    weights=Weights(
+        "strength", "d", "", (0.0, 1.0), "of term", 3e-3, stands_for="strength of term i"
+    ),
+    scale=(
         Parameter(
-            "relaxation_time",
-            "s",
-            (1e-3, 1.0),
-            "of the first term",
-            6e-3,
-            starts=(6e-3,),
-            logarithmic=True,
+            "relaxation_time", "s", (1e-3, 1.0), "of the first term", 6e-3,
+            starts=(6e-3,), logarithmic=True,
         ),
-        SETTLED,
+        "T",
     ),
+    more=((SETTLED, "g"),),
+    over=Axis("time after a step (s)"),
+    shows=Axis("slow part of the permittivity"),
     memory=_TERMS,
-    is_general=True,
-    curve=_response,
-)
+)  # fmt: skip
 
 
 @jit

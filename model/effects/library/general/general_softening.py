@@ -23,12 +23,14 @@ import numpy as np
 from dearig.model.coefficients import EFFECTS_AT, REST
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Curve, Effect, Law, Parameter
-from dearig.model.effects.shared.splines import step
+from dearig.model.effects.shared.splines import even, spline
 
 __all__ = ["EFFECT", "commit", "soften"]
 
 _STEPS = 6
 _PARTS = 5
+_DAMAGED = even(_STEPS, _STEPS, at_rest=False)
+_REGAINED = even(_PARTS, _PARTS - 1, at_rest=True)
 _TREMOR = 1e-3  # of stretch
 
 
@@ -148,18 +150,10 @@ def _largest(c, k, before, now, since):
 def soften(c, k, m, j, lam, since, t, warmth):
     now = abs(lam - c[REST])
     reach, width = c[k + _STEPS + _PARTS], c[k + _STEPS + _PARTS + 1]
-    most, spacing, lost = _largest(c, k, m[j], now, since), reach / _STEPS, 0.0
-    for i in range(_STEPS):
-        if c[k + i] > 0.0:
-            left = i * spacing
-            lost += c[k + i] * step(most, left, left + spacing, left + 2.0 * spacing)
-    part, wide = (most - now) / (most + width) * (1.0 + width / reach), 1.0 / (_PARTS - 1)
-    begun = most / (most + _TREMOR)
-    for i in range(_PARTS):
-        if c[k + _STEPS + i] > 0.0:
-            middle = i * wide
-            there = step(part, max(middle - wide, 0.0), middle, middle + wide)
-            lost += c[k + _STEPS + i] * begun * there
+    most = _largest(c, k, m[j], now, since)
+    lost = spline(c, k, most / reach, _DAMAGED)
+    part = (most - now) / (most + width) * (1.0 + width / reach)
+    lost += most / (most + _TREMOR) * spline(c, k + _STEPS, part, _REGAINED)
     return 1.0 - lost
 
 
