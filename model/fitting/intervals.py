@@ -373,7 +373,7 @@ def _guesses(
     )
     count = len(paths)
     # where the data hardly determine the others, the path is wrong: try them unmoved too
-    tried = np.vstack([along[:count], along[count], start])
+    tried = np.vstack([along[: count + 1], start])
     tried[:, index] = point
     costs, residuals = problem.evaluate(tried)
     costs = np.where(np.isfinite(costs), costs, np.inf) * problem.samples

@@ -29,6 +29,7 @@ _GAIN_LEFT = 0.01  # of the gain asked for: the step to so little is not taken
 _STRAIGHT_MIN = 0.5  # of the predicted gain: where less comes, the valley bends
 _PROBE = 0.1  # of a step: length of the finite difference along it
 _BEND_MAX = 0.4  # of a step: a larger second-order part is left out
+_SAME = 1e-3  # of a modulus: a step so short is one with either
 _FACTOR_MAX = 3.0  # logarithm of the factor by which a modulus moves at most in a step
 _TURNS_MAX = 4  # of each coordinate of a step between the inside and an end of its box
 _NO_ROOM = 1e-12  # relative: such an interval is a point
@@ -126,16 +127,17 @@ def descend(
         while not improved and damping <= _DAMPING_MAX:
             dampings = damping * _DAMPINGS
             steps = np.array([boxed_step(scaled, pull, d, low, high) for d in dampings]) / safe
-            if bent and not (straight or last):
+            trials = straight_and_scaled(layout, x, free, steps)
+            if straight:
+                trials = trials[: len(steps)]
+            elif bent and not last:
                 damped = [
                     ((low < s) & (s < high), scaled + d * np.eye(s.size))
                     for s, d in zip(steps * safe, dampings, strict=True)
                 ]
-                bend = _bend(problem, x, free, r, jac, steps, damped)
-                steps = np.vstack([steps, steps + bend])
-            trials = straight_and_scaled(layout, x, free, steps)
-            if straight:
-                trials = trials[: len(steps)]
+                turned = np.tile(x, (len(steps), 1))
+                turned[:, free] += steps + _bend(problem, x, free, r, jac, steps, damped)
+                trials = np.vstack([trials, np.clip(turned, layout.lower, layout.upper)])
             means, residuals = problem.evaluate(trials)
             costs = means * problem.samples
             best = int(np.argmin(costs))
@@ -265,9 +267,10 @@ def straight_and_scaled(
 ) -> np.ndarray:
     """Return coordinates (2 D, d) after ``steps`` (D, f) of the ``free`` ones from ``x`` (d,).
 
-    Along straight lines, then with moduli that move by factors. What two branches of nearly equal
-    times have together is a sum of their moduli, and straight. Of a fast branch the data determine
-    modulus times relaxation time: that valley is straight in logarithms.
+    Along straight lines, then with moduli that move by factors; (D, d) where both are the same.
+    What two branches of nearly equal times have together is a sum of their moduli, and straight. Of
+    a fast branch the data determine modulus times relaxation time: that valley is straight in
+    logarithms.
     """
     found = np.tile(x, (2 * len(steps), 1))
     found[:, free] += np.vstack([steps, steps])
@@ -277,5 +280,7 @@ def straight_and_scaled(
     with np.errstate(divide="ignore"):
         most = np.log(layout.upper[moduli] / own)
     part = np.clip((scaled[:, moduli] - own) / own, -_FACTOR_MAX, np.minimum(most, _FACTOR_MAX))
+    if np.max(np.abs(part), initial=0.0) < _SAME:
+        return np.clip(found[: len(steps)], layout.lower, layout.upper)
     scaled[:, moduli] = own * np.exp(part)
     return np.clip(found, layout.lower, layout.upper)
