@@ -137,7 +137,7 @@ def main() -> None:
     saw["operator"] = session.operator
     saw["planned"] = page.display.view.words.text()
     # a click while the window makes a page is dropped, as one that could not be answered
-    until(lambda: window.idle_pages.done, "all pages")
+    until(lambda: window.idle_pages.done and page.arm_button.answers, "all pages")
     click(page.arm_button)
     until(page.start_button.isEnabled, "armed")
     saw["armed"] = window.bar.badge.state.name
