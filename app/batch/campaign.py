@@ -204,7 +204,7 @@ def _check_arming(arming: Arming, address: str, left: bool) -> None:
     if (all(given) and arming.by) or (left and not any(given)):
         return
     raise InputError(
-        f"rig {address!r} carries high voltage while nobody may be beside it: say who arms "
+        f"rig {address!r} carries high voltage while no one may be at it: say who arms "
         f"it, for how many runs, and for how long",
         option=("operator", "runs", "hours"),
     )

@@ -377,7 +377,7 @@ def _solved(y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, int]:
 def with_extra(
     sample: Sample, variances: np.ndarray, extra: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the t values (k,) and probabilities (k,) of columns ``extra`` (n, k), each by itself.
+    """Return the t values (k,) and probabilities (k,) of columns ``extra`` (n, k), each alone.
 
     Each is that of its slope if it were added to the model, within films; 0 and 1 for a column
     that follows from the others.

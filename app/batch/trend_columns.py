@@ -275,7 +275,7 @@ def design_of(columns: Sequence[Covariate], used: np.ndarray) -> Design:
             ] or [c.label for c in kept]
             left_out.append(
                 f"{column.label}: it follows from {' and '.join(others)}, so that their effects "
-                f"cannot be told apart."
+                f"cannot be distinguished."
             )
             continue
         kept.append(column)

@@ -179,7 +179,7 @@ class _File(TomlTable):
     )
     repeat_after: list[SafeEnd] = Field(
         default_factory=list, max_length=len(SAFE_ENDS),
-        description="ends at confirmed 0 V after which a run counts as lost and nobody has to look",
+        description="ends at confirmed 0 V after which a run counts as lost and no one has to look",
     )  # fmt: skip
     template: str = Field(
         default="{name}-{number:04d}", min_length=1, max_length=NAME_MAX,

@@ -145,7 +145,7 @@ def _start_of_gap(text: str, at: int) -> int:
 
 
 def _are_whole(pieces: SegmentTexts, text: str) -> bool:
-    """Return True where each piece is TOML by itself and together they mean what ``text`` does."""
+    """Return True where each piece is TOML on its own and together they mean what ``text`` does."""
     try:
         data = tomllib.loads(pieces.head + pieces.foot)
         tables = [tomllib.loads(piece) for piece in pieces.segments]
@@ -207,7 +207,7 @@ def written_anew(tables: dict[str, Any], text: str) -> str:
 
 
 def _checked(edited: str, wanted: dict[str, Any], text: str) -> str:
-    """Return ``edited`` where it means ``wanted``, else ``wanted`` written anew."""
+    """Return ``edited`` where it means ``wanted``, else ``wanted`` written again."""
     try:
         same = tomllib.loads(edited) == wanted
     except tomllib.TOMLDecodeError:

@@ -345,7 +345,7 @@ class DaqmxRig:
         if acted is not None:
             raise RigError(
                 f"{call}: {acted.sentence}; make the rig safe and load the waveform again, which "
-                f"admits it anew"
+                f"admits it again"
             )
 
     @contextmanager

@@ -152,7 +152,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     ),
     "films held in two ways": (
         "identify {s}/film.h5 {s}/wide.h5 --out m.toml",
-        ["films were held in different ways (equibiaxial, uniaxial): fit each way by itself"],
+        ["films were held in different ways (equibiaxial, uniaxial): fit each way alone"],
     ),
     "branches in words": (
         "identify {s}/run.h5 --out m.toml --branches three",

@@ -27,6 +27,7 @@ from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import LimitsSettings
+from dearig.window.campaign.page import CampaignPage
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.run.controls import StepButton
 from dearig.window.run.page import RunPage
@@ -182,11 +183,18 @@ def keep(qtbot: QtBot) -> Iterator[Callable[[QWidget], None]]:
 
 
 @pytest.fixture
-def window(session: Session, keep: Callable[[QWidget], None], qtbot: QtBot) -> MainWindow:
+def window(
+    session: Session,
+    keep: Callable[[QWidget], None],
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> MainWindow:
     """The whole window with its first plan made; its simulated rig does not take its time.
 
-    A page is made when it is opened, not before the rig is armed: all pages are two seconds.
+    A page is made when it is opened, not before the rig is armed, and the page Campaign not at the
+    start: all pages are two seconds.
     """
+    monkeypatch.setattr(CampaignPage, "at_start", False)
     shown = MainWindow(session)
     shown.idle_pages.close()
     shown.resize(1366, 768)

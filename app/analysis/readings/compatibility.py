@@ -75,7 +75,7 @@ def base_model(
         if len(held) > 1:
             raise InputError(
                 f"these films were held in different ways ({', '.join(sorted(held))}): fit each "
-                f"way by itself"
+                f"way alone"
             )
         if rest_length_mm is not None:
             raise InputError(

@@ -1,4 +1,4 @@
-"""How a run ended that did not end by itself, and what that means for its use."""
+"""How a run ended that did not reach its end, and what that means for its use."""
 
 from __future__ import annotations
 

@@ -139,7 +139,7 @@ def _at_once(trends: Trends) -> Iterator[str]:
         yield (
             f"A single 95 % interval of an effect misses the true slope in 1 of 20 studies. The "
             f"{trends.intervals} intervals under “{_AT_ONCE}” hold all true slopes at once in 95 % "
-            f"of studies (Šidák; each by itself in "
+            f"of studies (Šidák; each one alone in "
             f"{significant(100.0 * trends.confidence_of_each, 4)} %)."
         )
 

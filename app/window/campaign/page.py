@@ -60,8 +60,8 @@ _ROWS = [2000, 3000]  # shares of the table, and of the curves of a run
 _BLOCK = "campaign"  # of the session
 #: Entries of the journal after which a campaign may be between two runs.
 _BETWEEN = ("recorded", "ended", "not-started", "request")
-_PLANNED = "the runs are planned, and the first one starts by itself"
-_NEXT = "the next run starts by itself"
+_PLANNED = "the runs are planned, and the first one starts automatically"
+_NEXT = "the next run starts automatically"
 _PAUSED = "the campaign is paused"
 
 

@@ -323,7 +323,7 @@ class FollowPage(Page):
             pieces.append(f"The limits of the rig file refuse it: {'; '.join(followed.reasons)}.")
         else:
             pieces.append(
-                "It is within all limits. Every run is armed by itself: click Show on Run, look at "
+                "It is within all limits. Every run is armed alone: click Show on Run, look at "
                 "its plan there, then Arm and Start."
             )
         pieces += [f"Not reachable: {part.sentence}." for part in missed]
@@ -457,6 +457,6 @@ _INTRODUCTION = (
     "model that computes the voltage, best one that a diagnosis has found.",
     "Compute the voltage shows what the model expects, the margins to all limits, and what the "
     "film cannot follow, before anything is played.",
-    "Show on Run shows the next run on the page Run. Every run is armed by itself, and STOP ends "
+    "Show on Run shows the next run on the page Run. Every run is armed on its own, and STOP ends "
     "it as any other. After it this page shows its error and the voltage that was learned from it.",
 )

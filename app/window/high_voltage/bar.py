@@ -27,7 +27,9 @@ from dearig.window.kit.theme import SPACE, digits
 from dearig.window.kit.widgets import ElidedLabel, button, label, plain_tip, set_role
 from dearig.window.session.state import Session
 
-__all__ = ["HighVoltageBar", "label_stop", "stop_button"]
+__all__ = ["STOP_NAME", "HighVoltageBar", "label_stop", "stop_button"]
+
+STOP_NAME = "stop"  #: name of the object of each button that stops
 
 _STOP = "⬣  STOP"
 _STOP_AGAIN = "⬣  0 V NOW"
@@ -42,7 +44,7 @@ def stop_button(points: int, height: int) -> QPushButton:
     It acts when it is pressed, not when it is released, and takes no focus from a field.
     """
     made = QPushButton(_STOP)
-    made.setObjectName("stop")
+    made.setObjectName(STOP_NAME)
     made.setFixedHeight(height)
     made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     font = QFont(made.font())

@@ -41,8 +41,8 @@ EXPLAINED = {
     "hand.",
     HighVoltage.ARMED: "Start (F6) begins the run; Esc or Space disarms, outside text fields. "
     "Keep away from the electrodes.",
-    HighVoltage.BETWEEN: "The output is at 0 V. The campaign starts its next run by itself, unless "
-    "it is paused. Esc, Space or STOP ends the campaign. Keep away from the electrodes.",
+    HighVoltage.BETWEEN: "The output is at 0 V. The campaign starts its next run automatically, "
+    "unless it is paused. Esc, Space or STOP ends the campaign. Keep away from the electrodes.",
     HighVoltage.ON: "A sequence is playing. The electrodes may carry 8 kV and more. Esc or Space "
     "stops.",
     HighVoltage.RAMPING: "The voltage is being ramped down to 0 V. Esc, Space or STOP: 0 V at "

@@ -1,10 +1,12 @@
-"""Keys that stop: Esc and Space, on every page, while the rig is armed or runs.
+"""Keys that stop: Esc and Space, on every page, while the rig is armed or runs; clicks on STOP.
 
 Space writes where a text field has the focus, and stops elsewhere. Esc closes what is open and has
 the focus (a menu, a list, a dialog, the guide, the cell that is edited, a search text), and stops
 where nothing is. The whole stroke of a key does the same: neither the repetitions of a key that has
 stopped nor its release reach a button or a field, and the repetitions of a key that has closed or
 written something do not stop.
+
+A click outside an open menu or list closes it, and nothing else hears of it. On STOP it stops too.
 """
 
 from __future__ import annotations
@@ -13,18 +15,20 @@ from collections.abc import Callable
 from typing import cast
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, Slot
-from PySide6.QtGui import QGuiApplication, QInputMethodEvent, QKeyEvent, QWindow
+from PySide6.QtGui import QGuiApplication, QInputMethodEvent, QKeyEvent, QMouseEvent, QWindow
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
     QComboBox,
     QLineEdit,
     QPlainTextEdit,
+    QPushButton,
     QTextEdit,
     QWidget,
 )
 from shiboken6 import isValid
 
+from dearig.window.high_voltage.bar import STOP_NAME
 from dearig.window.kit.window_filter import WindowFilter, widget_of
 
 __all__ = ["StopKeys"]
@@ -68,10 +72,26 @@ class StopKeys(WindowFilter):
             if typed == " " and self._busy() and not _writes():
                 self._stop(_NAMES[Qt.Key.Key_Space])
                 return True
+        elif kind == QEvent.Type.MouseButtonPress and isinstance(watched, QWindow):
+            return self._click_behind_popup(cast(QMouseEvent, event))
         elif kind in _STROKES and cast(QKeyEvent, event).key() in _NAMES:
             if not isinstance(watched, QWindow):
                 return False  # its window has seen it
             return self._stroke(watched, kind, cast(QKeyEvent, event))
+        return False
+
+    def _click_behind_popup(self, event: QMouseEvent) -> bool:
+        """Press STOP where a click on it would only close a menu or a list."""
+        popup, at = QApplication.activePopupWidget(), event.globalPosition().toPoint()
+        if popup is None or not self._busy() or popup.geometry().contains(at):
+            return False
+        for stop in self._window.findChildren(QPushButton, STOP_NAME):
+            if stop.isVisible() and stop.visibleRegion().contains(stop.mapFromGlobal(at)):
+                while popup is not None:  # a menu and its submenus
+                    popup.close()
+                    popup = QApplication.activePopupWidget()
+                stop.pressed.emit()
+                return True
         return False
 
     def _stroke(self, window: QWindow, kind: QEvent.Type, event: QKeyEvent) -> bool:

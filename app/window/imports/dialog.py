@@ -75,7 +75,7 @@ class ImportDialog(QDialog):
         self._writing = False
         self.content: Content | None = None
         self._signature = ""  # of the table, with its names as they are found by themselves
-        self._line = 0  # line of the names that was read, 0 if it was found by itself
+        self._line = 0  # line of the names that was read, 0 if it was found automatically
         self._tried: tuple[ImportOptions, RunMetadata] | None = None
         self.written: Path | None = None
         self._later = QTimer(self, singleShot=True, interval=_WAIT_MS)

@@ -53,7 +53,7 @@ class ImportFields(QWidget):
         self._there: frozenset[str] = frozenset()
         self._lines: dict[str, QLineEdit] = {}
         self.names_line = QSpinBox(minimum=0, maximum=100_000)
-        self.names_line.setSpecialValueText("found by itself")
+        self.names_line.setSpecialValueText("found automatically")
         self.names_line.setToolTip("Line of the names in a text file")
         self.skip = QCheckBox("Leave out &bad rows")
         self.skip.setToolTip(

@@ -7,9 +7,11 @@ import pytest
 
 from dearig.model.control import TrackingTask, VoltageLimits, invert, readings_under
 from dearig.model.control.linear import repeatable_part
+from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.simulation.actuator import Drive
 from dearig.model.simulation.stability import pull_in_voltage, static_stretch
+from tests.deep import mostly_deep
 from tests.tools.effect_cases import BY_VOLTAGE, THESIS, numbers, with_effect
 from tests.tools.targets import LEAD_IN, LIMITS, RATE, TAIL, path, task
 
@@ -68,7 +70,12 @@ def missed(model, found):
     return np.abs(reading.displacement - found.target)[compared].max()
 
 
-@pytest.mark.parametrize("name", [name for name in BY_VOLTAGE if name not in UNSTEADY])
+STEADY = [name for name in BY_VOLTAGE if name not in UNSTEADY]
+#: One effect of each family and hook, the others are deep.
+ONE_OF_EACH = {(EFFECTS[n].family, EFFECTS[n].acts_on): n for n in reversed(STEADY)}
+
+
+@pytest.mark.parametrize("name", mostly_deep(STEADY, ONE_OF_EACH.values()))
 def test_the_simulated_film_follows_the_target_of_its_inverse(name):
     model = with_effect(THESIS, name, numbers(name))
     found = inverted(model, path())

@@ -6,8 +6,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from PySide6.QtGui import QInputMethodEvent, QKeyEvent, QShortcut
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -282,3 +283,26 @@ def test_the_time_to_start_is_counted_down(
     now.at += 20.0
     qtbot.waitUntil(lambda: not page.runner.armed)
     assert not page.start_button.isEnabled()
+
+
+def test_a_click_on_stop_stops_with_a_menu_or_a_list_open(qtbot: QtBot, window: MainWindow) -> None:
+    page = window.run_page
+    menu = page.plots.area.tools.menu
+    opened = {
+        "menu": lambda: menu.popup(window.mapToGlobal(window.rect().center())),
+        "list": page.display.view.span.showPopup,
+    }
+    system = window.windowHandle()
+    assert system is not None
+    for name, show in opened.items():
+        for stop in (window.bar.stop_button, page.stop_button):
+            press(qtbot, page.arm_button)
+            show()
+            QTest.mouseClick(system, LEFT, pos=window.bar.badge.mapTo(window, QPoint(5, 5)))
+            assert page.runner.armed  # a click elsewhere only closes it
+            if QApplication.activePopupWidget() is None:
+                show()
+            QTest.mouseClick(system, LEFT, pos=stop.mapTo(window, stop.rect().center()))
+            assert not page.runner.armed, name
+            assert QApplication.activePopupWidget() is None
+            assert "disarmed by STOP" in window.bar.detail.text()
