@@ -12,17 +12,43 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.optimize import lsq_linear
 
-from dearig.model.fitting.levenberg import LocalFit, box_of, boxed_step, gain_within
+from dearig.model.fitting.levenberg import LocalFit
 from dearig.model.fitting.problem import Problem
 
-__all__ = ["descend_broyden"]
+__all__ = ["boxed_step", "descend_broyden"]
 
 _DAMPINGS = np.array([3e-3, 1.0])  # tried at once, relative to the current damping
 _DAMPING_MAX = 1e7
+_FLAT = 1e-9  # of the scaled curvature: the data do not determine flatter directions
 _SECANT_STEPS_MAX = 5  # then the Jacobian is computed again
 _PATIENCE = 3  # Jacobians that together must lower chi-square by the gain asked for
 _GAIN_SHARE_MIN = 0.25  # of the predicted gain: below, the Jacobian is computed again
+
+
+def boxed_step(
+    normal: np.ndarray, gradient: np.ndarray, damping: float, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Return the best damped least-squares step (f,) within a box about 0.
+
+    It minimises 2 gradient.s + s.(normal + damping I).s for low <= s <= high, all (f,). A step that
+    is clipped afterwards would leave a narrow valley of the cost.
+    """
+    root = cholesky(normal + damping * np.eye(gradient.size))
+    step = -cho_solve((root, False), gradient)
+    if np.all((low <= step) & (step <= high)):
+        return np.asarray(step)
+    # a coordinate without room between its bounds is no unknown
+    open_ = high - low > 1e-12 * (1.0 + np.abs(low) + np.abs(high))
+    step = np.where(open_, 0.0, np.clip(0.0, low, high))
+    if open_.any():
+        # |root step - aim|^2 is the quadratic model, but for a constant
+        aim = -solve_triangular(root, gradient, trans="T") - root @ step
+        found = lsq_linear(root[:, open_], aim, (low[open_], high[open_]), method="bvls")
+        step[open_] = np.clip(found.x, low[open_], high[open_])
+    return step
 
 
 def descend_broyden(
@@ -105,9 +131,12 @@ def _broyden(
         scale = np.linalg.norm(jac, axis=0)
         scale = np.where(scale > 0.0, scale, np.inf)  # a parameter without influence does not move
         normal, gradient = (jac / scale).T @ (jac / scale), (jac / scale).T @ r
+        part, reach = x[free], layout.reach(x)[free]
         finite = np.where(np.isfinite(scale), scale, 0.0)
-        low, high = (ends * finite for ends in box_of(layout, x, free))
-        if gain_within(normal, gradient, low, high) < gain:
+        low = np.maximum(layout.lower[free] - part, -reach) * finite
+        high = np.minimum(layout.upper[free] - part, reach) * finite
+        best_step = boxed_step(normal, gradient, _FLAT, low, high)
+        if -float(best_step @ (2.0 * gradient + normal @ best_step)) < gain:
             if not sure or (fresh and not coarse):
                 converged = True
                 break
@@ -119,7 +148,7 @@ def _broyden(
         dampings = damping * _DAMPINGS
         steps = np.array([boxed_step(normal, gradient, d, low, high) for d in dampings]) / scale
         trials = np.tile(x, (dampings.size, 1))
-        trials[:, free] = np.clip(x[free] + steps, layout.lower[free], layout.upper[free])
+        trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
         costs, residuals = problem.evaluate(trials)
         best = int(np.argmin(costs))
         better = float(costs[best]) * problem.samples
@@ -136,7 +165,7 @@ def _broyden(
                 converged = True
                 break
             continue
-        step = steps[best]
+        step = trials[best][free] - part
         bent = residuals[best] - r - jac @ step
         straight = r + jac @ step
         predicted = chi2 - float(straight @ straight)

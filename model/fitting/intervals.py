@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-import scipy  # loads its parts when they are first used, which a run may never do
+from scipy.special import kolmogorov
 
-from dearig.model.fitting.levenberg import (
-    LocalFit,
-    box_of,
-    boxed_step,
-    descend,
-    gain_within,
-    straight_and_scaled,
-)
+from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
 
@@ -45,8 +37,6 @@ _NORMAL_95 = math.sqrt(CHI2_95)
 #: determine. Derivatives by differences are known to some 1e-5; a smaller eigenvalue is the square
 #: of their error.
 _TOLD = 1e-10
-#: The same, of a direction along which derivatives hold as far as an interval reaches.
-_FIRM = 1e-5
 _DETERMINED_RATIO = 5.0  # ratio of the ends of an interval, above which a value is not quoted
 _POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: tolerance of its crossing
@@ -54,11 +44,6 @@ _NEAR_A_LIMIT = 0.3  # the same for an undetermined limit, which is bounded to d
 _SHORTER = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, tried in turn
 _BY_CHANCE = 0.01  # significance level: share of white noise that the test rejects
 _EXPONENT_MAX = 700.0  # of a number that the machine has
-_BENT_MAX = 0.5  # of a change of the residuals: its part that is not along a straight path
-_HARDLY = 0.05  # of the threshold: a point that costs less is far inside without a refit
-_CHORDS_MAX = 4  # steps of a refit by the derivatives of another point
-_CHORD_DAMPING = 1e-6  # of the scaled curvature
-_MISSED_MAX = 0.3  # of a predicted gain: farther off, the derivatives are computed
 _GUESS_MAX = 1e4  # thresholds above the optimum from which a refit takes a few iterations
 
 
@@ -111,13 +96,13 @@ def unevenness(residuals: np.ndarray, by_chance: float = _BY_CHANCE) -> float:
     With 5000 samples it detects a twentieth of the power elsewhere.
     """
     away, lines = spectrum_distance(residuals)
-    return away if scipy.special.kolmogorov(away * math.sqrt(lines)) <= by_chance else 0.0
+    return away if kolmogorov(away * math.sqrt(lines)) <= by_chance else 0.0
 
 
 def has_spectrum_of(residuals: np.ndarray, noise: np.ndarray) -> bool:
     """Whether ``residuals`` (N,) have the spectrum of a sample of ``noise`` (M,), by chance."""
     away, lines = spectrum_distance(residuals, noise)
-    return bool(scipy.special.kolmogorov(away * math.sqrt(lines)) > _BY_CHANCE)
+    return bool(kolmogorov(away * math.sqrt(lines)) > _BY_CHANCE)
 
 
 def spectrum_distance(
@@ -189,9 +174,9 @@ def _inverse(normal: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.n
     return np.asarray((q * of(w)) @ q.T / np.outer(scale, scale))
 
 
-def _pseudo_inverse(normal: np.ndarray, least: float) -> np.ndarray:
-    """Return the inverse of ``normal`` (f, f), 0 along eigenvalues below ``least``."""
-    return _inverse(normal, lambda w: np.where(w > least, 1.0 / np.maximum(w, least), 0.0))
+def _pseudo_inverse(normal: np.ndarray) -> np.ndarray:
+    """Return the inverse of ``normal`` (f, f), 0 along directions that are not determined."""
+    return _inverse(normal, lambda w: np.where(w > _TOLD, 1.0 / np.maximum(w, _TOLD), 0.0))
 
 
 def firm_directions(
@@ -262,9 +247,7 @@ class _Path:
     """Path of the refitted parameters while parameter ``index`` moves away from ``start`` (d,).
 
     ``first`` and ``second`` (d,) are the first two derivatives of the path by that parameter,
-    ``sigma`` its standard deviation by these derivatives. ``residuals`` (N,) are those at the
-    start, ``left`` (N,) their derivative along the path, ``jacobian`` (N, f) those by the refitted
-    parameters.
+    ``sigma`` its standard deviation by these derivatives.
     """
 
     index: int
@@ -272,28 +255,11 @@ class _Path:
     first: np.ndarray
     second: np.ndarray
     sigma: float
-    residuals: np.ndarray
-    left: np.ndarray
-    jacobian: np.ndarray
 
     def ahead(self, point: float) -> np.ndarray:
         """Return the extrapolated parameters (d,) at a ``point`` of the moved parameter."""
         s = point - self.start[self.index]
         return self.start + self.first * s + 0.5 * self.second * s * s
-
-    def bends(self, point: float, residuals: np.ndarray) -> bool:
-        """Whether ``residuals`` (N,) at a ``point`` are far from those of a straight path.
-
-        Then derivatives at its start do not serve there.
-        """
-        straight = self.left * (point - self.start[self.index])
-        bent = residuals - self.residuals - straight
-        return float(bent @ bent) > _BENT_MAX**2 * float(straight @ straight)
-
-    def onward(self, x: np.ndarray) -> _Path:
-        """Return the path from a refit ``x`` (d,) on it, by the same derivatives."""
-        s = x[self.index] - self.start[self.index]
-        return replace(self, start=x, first=self.first + self.second * s)
 
 
 def _path(
@@ -304,29 +270,17 @@ def _path(
     slope: np.ndarray,
     others: np.ndarray,
     index: int,
-    sign: float,
-    *,
-    least: float,
 ) -> _Path:
-    """Return the path of coordinate ``index`` from ``best`` (d,), to the side of its ``sign``.
+    """Return the path of coordinate ``index`` from ``best`` (d,).
 
     ``residuals`` (N,) are those there, ``j`` (N, f) is the Jacobian of the ``others``
-    (d,) bool, ``slope`` (N,) its own column. One that would leave its bounds stays there, and
-    nothing moves along directions of eigenvalues below ``least``.
+    (d,) bool, ``slope`` (N,) its own column.
     """
     layout = problem.layout
-    moving = others.copy()
+    inverse = _pseudo_inverse(j.T @ j)
     first, second = np.zeros(layout.size), np.zeros(layout.size)
     first[index] = 1.0
-    while True:
-        part = j[:, moving[others]]
-        inverse = _pseudo_inverse(part.T @ part, least)
-        first[others] = 0.0
-        first[moving] = -inverse @ (part.T @ slope)
-        out = moving & np.where(sign * first > 0.0, best >= layout.upper, best <= layout.lower)
-        if not out.any():
-            break
-        moving &= ~out
+    first[others] = -inverse @ (j.T @ slope)
     left = slope + j @ first[others]
     sigma = 1.0 / max(math.sqrt(float(left @ left)), 1e-150)
     # wide enough to resolve the curvature, and still local
@@ -335,100 +289,23 @@ def _path(
     if others.any() and np.all((sides >= layout.lower) & (sides <= layout.upper)):
         _, (below, above) = problem.evaluate(sides)
         bend = ((above - residuals) - (residuals - below)) / probe**2
-        second[moving] = -inverse @ (part.T @ bend)
-    return _Path(index, best, first, second, sigma, residuals, left, j)
+        second[others] = -inverse @ (j.T @ bend)
+    return _Path(index, best, first, second, sigma)
 
 
-def _paths(*about: Any) -> tuple[_Path, ...]:
-    """Return the paths of ``_path``: in all directions that are determined, and in the firm ones.
-
-    Where two parameters act alike, derivatives say that they move far together, and are wrong.
-    """
-    full, firm = (_path(*about, least=least) for least in (_TOLD, _FIRM))
-    return (full,) if np.array_equal(full.first, firm.first) else (full, firm)
-
-
-@dataclass(frozen=True)
-class _Guess:
-    """Coordinates ``x`` (d,) from which a refit starts, with chi-square and residuals (N,)."""
-
-    x: np.ndarray
-    chi2: float
-    residuals: np.ndarray
-
-
-def _guesses(
-    problem: Problem, paths: Sequence[_Path], point: float, held: np.ndarray, reach: np.ndarray
-) -> tuple[_Path, _Guess, _Guess]:
-    """Return the best of the ``paths`` to a ``point`` and where it leads, and the start of a refit.
-
-    A refit starts where the first of the paths leads: that is nearer to the end of a valley, though
-    it may cost more.
-    """
-    start, index = paths[0].start, paths[0].index
-    refitted = ~held & (np.arange(held.size) != index)
-    steps = np.array([path.ahead(point) - start for path in paths])
-    along = straight_and_scaled(
-        problem.layout, start, refitted, np.clip(steps, -reach, reach)[:, refitted]
-    )
-    count = len(paths)
+def _guess(
+    problem: Problem, path: _Path, point: float, held: np.ndarray, reach: np.ndarray
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return parameters (d,) from which the refit at ``point`` starts; their cost, residuals."""
+    layout = problem.layout
+    moved = path.start + np.clip(path.ahead(point) - path.start, -reach, reach)
+    moved = np.where(held, path.start, np.clip(moved, layout.lower, layout.upper))
     # where the data hardly determine the others, the path is wrong: try them unmoved too
-    tried = np.vstack([along[: count + 1], start])
-    tried[:, index] = point
-    costs, residuals = problem.evaluate(tried)
-    costs = np.where(np.isfinite(costs), costs, np.inf) * problem.samples
-    found = [_Guess(*each) for each in zip(tried, map(float, costs), residuals, strict=True)]
-    best = int(np.argmin(costs))
-    from_first = min((found[0], *found[count:]), key=lambda guess: guess.chi2)
-    return paths[best if best < count else 0], found[best], from_first
-
-
-def _refit(
-    problem: Problem,
-    path: _Path,
-    guess: _Guess,
-    start: _Guess,
-    fixed: np.ndarray,
-    little: float,
-) -> LocalFit:
-    """Return the refit at the point of a ``guess`` on a ``path``.
-
-    It has converged where no more than ``little`` of chi-square is left. The derivatives at the
-    beginning of the path serve as long as they predict what a step gains; where they do not, the
-    refit descends from ``start``.
-    """
-    layout, jac = problem.layout, path.jacobian
-    x, r, chi2 = guess.x, guess.residuals, guess.chi2
-    scale = np.linalg.norm(jac, axis=0)
-    safe = np.where(scale > 0.0, scale, 1.0)
-    scaled = jac.T @ jac / np.outer(safe, safe)
-    for _ in range(0 if path.bends(float(x[path.index]), r) else _CHORDS_MAX):
-        pull = jac.T @ r / safe
-        low, high = (ends * scale for ends in box_of(layout, x, ~fixed))
-        to_gain = gain_within(scaled, pull, low, high)
-        if to_gain < little:
-            return LocalFit(x, chi2 / problem.samples, r, jac, 0, True, to_gain)
-        step = boxed_step(scaled, pull, _CHORD_DAMPING, low, high) / safe
-        trials = straight_and_scaled(layout, x, ~fixed, step[None])
-        costs, there = problem.evaluate(trials)
-        best = int(np.argmin(costs))
-        gained = chi2 - float(costs[best]) * problem.samples
-        if abs(gained - to_gain) > _MISSED_MAX * to_gain:
-            break
-        x, r, chi2 = trials[best], there[best], chi2 - gained
-    return descend(
-        problem,
-        start.x,
-        fixed,
-        iterations=8,
-        gain=little,
-        damping=1e-5,
-        patience=2,
-        quick=True,
-        straight=True,
-        known=start.residuals,
-        beside=np.arange(layout.size) == path.index,
-    )
+    both = np.stack([moved, path.start])
+    both[:, path.index] = point
+    costs, residuals = problem.evaluate(both)
+    better = int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))
+    return both[better], float(costs[better]), residuals[better]
 
 
 def profile(
@@ -459,16 +336,15 @@ def profile(
     others = ~fixed
     # one that is freed for its own end is not in the Jacobian
     moved = problem.jacobian(best, own) if held[index] else jac[:, ~others[~held]]
-    here = problem.residuals(best)
-    about = (problem, best, here, jac[:, others[~held]], moved[:, 0], others, index)
-    free_to_move = bool(np.all((best > layout.lower) & (best < layout.upper) | ~others))
-    centre = _paths(*about, sides[0])
+    centre = _path(
+        problem, best, problem.residuals(best), jac[:, others[~held]], moved[:, 0], others, index
+    )
     reach = layout.reach(best)
     ends = {-1.0: -math.inf, 1.0: math.inf}
     for sign in sides:
         bound = layout.lower[index] if sign < 0 else layout.upper[index]
-        paths = centre if free_to_move or sign == sides[0] else _paths(*about, sign)
-        step = min(1.96 * paths[0].sigma * math.sqrt(inflation), reach[index])
+        path = centre
+        step = min(1.96 * path.sigma * math.sqrt(inflation), reach[index])
         inside, z_inside = best[index], 0.0
         near = _NEAR_A_LIMIT if held[index] else _NEAR
         outside, z_outside = math.inf, math.inf
@@ -480,20 +356,26 @@ def profile(
                 point = float(
                     np.clip(inside + sign * step * part, layout.lower[index], layout.upper[index])
                 )
-                path, guess, start = _guesses(problem, paths, point, held, reach)
-                near_enough = start.chi2 - chi2 < _GUESS_MAX * threshold
-                if near_enough or not path.bends(point, guess.residuals):
+                guess, cost, residuals = _guess(problem, path, point, held, reach)
+                if cost * problem.samples - chi2 < _GUESS_MAX * threshold:
                     break
             at_bound = sign * (point - bound) >= 0.0
             step_before = abs(point - inside)
             # as much as moves the crossing by its tolerance: the quadratic model's word is taken
             little = 2.0 * near * threshold
-            if guess.chi2 - chi2 < _HARDLY * threshold:
-                # and a refit is lower still
-                cost = guess.chi2 / problem.samples
-                fit = LocalFit(guess.x, cost, guess.residuals, path.jacobian, 0, True)
-            else:
-                fit = _refit(problem, path, guess, start, fixed, little)
+            fit = descend(
+                problem,
+                guess,
+                fixed,
+                iterations=8,
+                gain=little,
+                damping=1e-5,
+                patience=2,
+                quick=True,
+                straight=True,
+                known=residuals,
+                beside=own,
+            )
             if chi2 - fit.cost * problem.samples > gain:
                 raise BetterPoint(fit.x, chi2 - fit.cost * problem.samples)
             excess = fit.cost * problem.samples - fit.to_gain - chi2
@@ -508,13 +390,8 @@ def profile(
                     break
                 slope = (z - z_inside) / step_before
                 inside, z_inside = point, z
-                if fit.beside is None:
-                    paths = (path.onward(fit.x),)
-                else:
-                    paths = _paths(
-                        problem, fit.x, fit.residuals, fit.jacobian, fit.beside[:, 0], others,
-                        index, sign,
-                    )  # fmt: skip
+                column = np.zeros(fit.residuals.size) if fit.beside is None else fit.beside[:, 0]
+                path = _path(problem, fit.x, fit.residuals, fit.jacobian, column, others, index)
                 step = (1.0 - z) / slope if slope > 0.0 else reach[index]
                 step = min(step, 4.0 * step_before, reach[index])
             else:

@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import minimize
 
 from dearig.model.film.material import Network
-from dearig.model.fitting.broyden import descend_broyden
-from dearig.model.fitting.levenberg import boxed_step, descend
+from dearig.model.fitting.broyden import boxed_step, descend_broyden
+from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from tests.tools.engine import PLAIN, effect, record_of
