@@ -201,7 +201,9 @@ LEAK = with_effect("leakage", loss=0.02, growth=2.0, exponent=1.0)
 
 
 @pytest.mark.parametrize("usual", [1, 100])
-def test_the_current_separates_what_a_poor_laser_does_not(usual):
+def test_the_current_separates_what_a_poor_laser_does_not(usual, monkeypatch):
+    some = {name: candidates(8.0)[name] for name in ("a long hold", "quick steps")}
+    monkeypatch.setattr(experiment, "candidates", lambda _: some)
     saturated = with_effect("amplifier saturation", loss=0.02, exponent=3.0)
     rivals = [("leakage", "leakage", LEAK), ("saturation", "amplifier", saturated)]
     rig, noise = averaging(SLOW, usual), 100.0 * NOISE
@@ -218,7 +220,8 @@ def test_the_current_separates_what_a_poor_laser_does_not(usual):
     assert "The current tells most" in words
 
 
-def test_channels_change_nothing_where_there_are_none():
+def test_channels_change_nothing_where_there_are_none(monkeypatch):
+    monkeypatch.setattr(experiment, "candidates", lambda top: {"steps": candidates(top)["steps"]})
     with_none = separating_experiment(RIVALS, SLOW, NOISE, RigChannels(()))
     assert with_none == separating_experiment(RIVALS, SLOW, NOISE)
     assert with_none[0].by_channel == (("displacement", with_none[0].separation),)

@@ -146,6 +146,10 @@ MEASUREMENTS = {
             "--generator second",
         ),
     ),
+    "other-makers": Measurement(
+        "Rigs of a third maker, in forms that neither generator has",
+        ("tests.benchmarks.bench_other_makers",),
+    ),
     "diagnosis-peers": Measurement(
         "The diagnosis beside general methods",
         ("tests.benchmarks.bench_diagnosis --train thesis --seeds 2003,79,225",),
