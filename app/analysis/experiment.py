@@ -282,7 +282,7 @@ def _by_channels(found: SeparatingExperiment, usual: int) -> str:
     name, apart = max(found.by_channel, key=lambda pair: pair[1])
     said = f". The {name.replace('_', ' ')} tells most: {apart:.2g} times its noise"
     if found.average != usual:
-        said += f", recorded with [card] average = {found.average}"
+        said += f", recorded in means of {found.average} conversions"
     return said
 
 

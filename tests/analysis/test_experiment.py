@@ -216,7 +216,7 @@ def test_the_current_separates_what_a_poor_laser_does_not(usual, monkeypatch):
     assert told["current"] > 5.0
     # an instant sees nothing of how a film charges: a wire that is off would read the same
     assert found.average == 100
-    assert ("recorded with [card] average = 100" in words) == (usual == 1)
+    assert ("recorded in means of 100 conversions" in words) == (usual == 1)
     assert "The current tells most" in words
 
 
