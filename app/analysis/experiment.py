@@ -60,6 +60,7 @@ SHARED = 0.05
 _SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
 _INTERLOCK_MARGIN = 0.7  # part of an interlock's threshold: no rival predicts the film exactly
 _DELAY_BLUR = 1.0  # noise floors; largest displacement within the uncertainty of the laser's delay
+_NO_CHANNELS = RigChannels()
 _NEAR_BEST = 0.9  # part of the best separation; above it the highest separation per second wins
 
 
@@ -124,7 +125,7 @@ def separating_experiment(
     rivals: Sequence[tuple[str, str, Actuator]],
     rig_file: RigFile,
     noise: float,
-    electric: RigChannels | None = None,
+    electric: RigChannels = _NO_CHANNELS,
 ) -> tuple[SeparatingExperiment | None, str]:
     """Return the sequence that separates the two closest of ``rivals`` best, and a sentence on it.
 
@@ -139,12 +140,14 @@ def separating_experiment(
     labels = tuple(label for label, _, _ in rivals)
     families = tuple(dict.fromkeys(family for _, family, _ in rivals))
     made: list[_Tried] = []
+    averages: tuple[int, ...] = ()
     for name, text in candidates(_top_kV(rig_file)).items():
         playable = _playable(text, name, rivals, rig_file, noise)
         if playable is None:
             continue
         loaded, waveform, predictions = playable
-        for average in _averages(electric, loaded, rig_file):
+        averages = averages or _averages(electric, loaded, rig_file)
+        for average in averages:
             apart = {
                 (labels[i], labels[j]): _separation(
                     (rivals[i][2], rivals[j][2]), (predictions[i], predictions[j]),
@@ -194,12 +197,11 @@ def separating_experiment(
     )
     alike = [_and(p) for p in pairs if p not in separable]
     but = f". No excitation separates {'; '.join(alike)}" if alike else ""
-    usual = electric.average if electric is not None else 1
     return found, (
         f"{chosen.name!r} ({chosen.seconds:.0f} s) separates {_and(labels)} best among "
         f"{len(found.tried)} excitations within the rig's limits: the predictions of any two "
         f"differ by at least {found.separation:.2g} times the noise"
-        f"{_by_channels(found, usual)}{but}"
+        f"{_by_channels(found, rig_file.card.average)}{but}"
     )
 
 
@@ -223,19 +225,19 @@ class _Tried:
     average: int
 
 
-def _averages(
-    electric: RigChannels | None, loaded: LoadedSequence, rig_file: RigFile
-) -> tuple[int, ...]:
-    """Return the numbers of conversions in a row to be tried: what the rig does, and more."""
-    if electric is None:
-        return (rig_file.card.average,)
-    if not electric.channels or electric.average >= AVERAGED:
-        return (electric.average,)
+def _averages(electric: RigChannels, loaded: LoadedSequence, rig_file: RigFile) -> tuple[int, ...]:
+    """Return the numbers of conversions in a row to be tried: what the rig does, and more.
+
+    More is tried where the rig can play ``loaded`` so.
+    """
+    usual = rig_file.card.average
+    if not electric.channels or usual >= AVERAGED:
+        return (usual,)
     try:
         plan(loaded, averaging(rig_file, AVERAGED)).admitted()
     except InputError:
-        return (electric.average,)
-    return electric.average, AVERAGED
+        return (usual,)
+    return usual, AVERAGED
 
 
 def averaging(rig_file: RigFile, average: int) -> RigFile:
@@ -249,40 +251,41 @@ def _separation(
     predictions: tuple[np.ndarray, np.ndarray],
     waveform: GatedWaveform,
     noise: float,
-    electric: RigChannels | None,
+    electric: RigChannels,
     average: int,
     card: CardSettings,
 ) -> _Apart:
     """Return how far two models are apart; of two films that could be, the one that shows less."""
     moved = root_mean_square(predictions[0] - predictions[1]) / noise
-    if electric is None or not electric.channels:
+    if not electric.channels:
         return _Apart(moved, (("displacement", moved),))
     stride = round(waveform.samples / predictions[0].size)
     conversions = stride * average / card.average
     drive = _drive(waveform, stride)
-    ways = [
+    both = [
         electric.apart(
             models[i], models[1 - i], drive, predictions[i], conversions, means=average > 1
         )
         for i in (0, 1)
     ]
-    told = min(ways, key=lambda way: sum(chi2 for chi2, _ in way.values()))
-    chi2 = sum(value for value, _ in told.values())
+    less = min(both, key=lambda seen: sum(chi2 for chi2, _ in seen.values()))
+    chi2 = sum(value for value, _ in less.values())
     return _Apart(
         math.sqrt(moved**2 + chi2 * card.average / waveform.samples),
-        (("displacement", moved), *((name, rms) for name, (_, rms) in told.items())),
+        (("displacement", moved), *((name, rms) for name, (_, rms) in less.items())),
     )
 
 
 def _by_channels(found: SeparatingExperiment, usual: int) -> str:
-    """Return which channel tells most, and how it is to be recorded; "" without channels."""
-    if len(found.by_channel) < 2:
+    """Return what the best electrical channel would show, and how to record it; "" without one."""
+    electric = [pair for pair in found.by_channel if pair[0] != "displacement"]
+    if not electric:
         return ""
-    # means at 200 Hz of a channel are as many as the rows or fewer
-    name, apart = max(found.by_channel, key=lambda pair: pair[1])
-    said = f". The {name.replace('_', ' ')} tells most: {apart:.2g} times its noise"
+    name, apart = max(electric, key=lambda pair: pair[1])
+    channel = name.replace("_", " ")
+    said = f". Means of the {channel} at 200 Hz differ by {apart:.2g} times their noise"
     if found.average != usual:
-        said += f", recorded in means of {found.average} conversions"
+        said += f", if every row is the mean of {found.average} conversions"
     return said
 
 
@@ -445,7 +448,7 @@ def experiment_of(
             rivals,
             of_rig(rig_file, final.film, final.load),
             noise,
-            channels_of(readings, finding) if readings else None,
+            channels_of(readings, finding),
         )
     if rejected:
         return None, (

@@ -210,14 +210,15 @@ def test_the_current_separates_what_a_poor_laser_does_not(usual, monkeypatch):
     alone, why = separating_experiment(rivals, rig, noise)
     assert alone is None, "the displacement alone does not separate them"
     assert "times the noise" in why
-    found, words = separating_experiment(rivals, rig, noise, RigChannels((CURRENT,), usual))
+    found, words = separating_experiment(rivals, rig, noise, RigChannels((CURRENT,)))
     told = dict(found.by_channel)
     assert found.separation > SEPARATES > told["displacement"]
     assert told["current"] > 5.0
     # an instant sees nothing of how a film charges: a wire that is off would read the same
     assert found.average == 100
-    assert ("recorded in means of 100 conversions" in words) == (usual == 1)
-    assert "The current tells most" in words
+    assert ("if every row is the mean of 100 conversions" in words) == (usual == 1)
+    seen = f"Means of the current at 200 Hz differ by {told['current']:.2g} times their noise"
+    assert seen in words
 
 
 def test_channels_change_nothing_where_there_are_none(monkeypatch):

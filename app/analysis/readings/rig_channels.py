@@ -27,13 +27,9 @@ AVERAGED = 100
 
 @dataclass(frozen=True)
 class RigChannels:
-    """Electrical channels of a rig, each with the noise of one conversion.
+    """Electrical channels of a rig, each with the noise of one conversion."""
 
-    ``average`` is the number of conversions in a row of its recordings.
-    """
-
-    channels: tuple[ChannelRecord, ...]
-    average: int = 1
+    channels: tuple[ChannelRecord, ...] = ()
 
     def apart(
         self,
@@ -91,18 +87,13 @@ def channels_of(readings: Iterable[Readings], finding: Diagnosis) -> RigChannels
     The monitor is left out where it denies a fault of the amplifier: the fault may lie behind it.
     """
     denied = {d.channel for d in finding.denials if d.is_of_monitor}
+    used = {result.name for result in finding.channels if result.used} - denied
     best: dict[str, ChannelRecord] = {}
-    averages = [1]
     for each in readings:
-        record = each.record
-        electric = getattr(record, "electric", None)
-        average = each.recording.average
-        averages.append(average)
-        used = {result.name for result in finding.channels if result.used}
+        electric = getattr(each.record, "electric", None)  # films have none
         for channel in electric.used if electric is not None else ():
-            one = replace(channel, noise=channel.noise * math.sqrt(average))
-            if channel.name in used - denied and (
-                channel.name not in best or one.noise < best[channel.name].noise
-            ):
+            one = replace(channel, noise=channel.noise * math.sqrt(each.recording.average))
+            known = best.get(channel.name)
+            if channel.name in used and (known is None or one.noise < known.noise):
                 best[channel.name] = one
-    return RigChannels(tuple(best.values()), max(averages))
+    return RigChannels(tuple(best.values()))

@@ -38,7 +38,7 @@ class Form(QWidget):
     ) -> None:
         super().__init__(parent)
         self._fields = {field.key: field for field in fields}
-        self._about: list[QLabel] = []  # beside the fields, where there is room
+        self._about: list[QLabel] = []  # hidden where the form is narrow
         self._widgets: dict[str, QLineEdit | QComboBox] = {}
         self._below: dict[str, Message] = {}
         self._faults: dict[str, str] = {}  # found by the check of the file

@@ -2,7 +2,7 @@
 
 Qt's own fields drop the key of a sign that is not the language's decimal one: 0.5 typed on a German
 computer is 5. Here a text that is no number, is ambiguous or outside the limits is shown as it is
-typed, marked, and gives way to the last number when the field is left.
+typed and marked; when the field is left, the last number is shown again.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class NumberBox(QDoubleSpinBox):
         self.editingFinished.connect(self._mark)
 
     def value(self) -> float:
-        """Return the number that is shown; a text that is none gives way to the last one."""
+        """Return the number that is shown; the last one where the text is no number."""
         self.interpretText()
         self._mark()
         return super().value()
@@ -70,7 +70,7 @@ class WholeBox(QSpinBox):
         self.editingFinished.connect(self._mark)
 
     def value(self) -> int:
-        """Return the number that is shown; a text that is none gives way to the last one."""
+        """Return the number that is shown; the last one where the text is no number."""
         self.interpretText()
         self._mark()
         return super().value()

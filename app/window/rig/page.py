@@ -66,7 +66,7 @@ class RigPage(Page):
         self.text = session.rig_text
         self._in_force = session.rig_text  # the last text without faults
         self._typing = False  # a name or server is typed, and not taken
-        self._saved_meanwhile = False  # while a run went on
+        self._saved_meanwhile = False  # the file was saved during a run
         self.forms: dict[str, Form] = {}  # made when their tab is first shown
         self._areas: dict[str, QScrollArea] = {}
         self.file = EditedFile("rig file", session.rig_text, session.rig_path)
