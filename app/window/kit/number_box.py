@@ -1,8 +1,8 @@
 """Fields of a number with arrows, whose text means the same in every language of the system.
 
-Qt's own fields drop the key of a sign that is not the language's decimal one: 0.5 typed on a German
-computer is 5. Here a text that is no number, is ambiguous or outside the limits is shown as it is
-typed and marked; when the field is left, the last number is shown again.
+Qt's own fields leave out a sign that is not the language's decimal one when they read a text: 0.5
+typed on a German computer is 5. Here a text that is no number, is ambiguous or outside the limits
+is shown as it is typed and marked; when the field is left, the last number is shown again.
 """
 
 from __future__ import annotations
