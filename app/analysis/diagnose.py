@@ -111,7 +111,8 @@ def diagnose_recordings(
     finding = _search(fitted, others, base, settings, progress)
     finding = _budgeted(finding, fitted, settings, progress)
     said = (*left_out, *also_left_out, *quality)
-    return _outcome(fitted, others, finding, said, settings, "", started, clock)
+    with Interrupts():  # what the search has found is not lost in the seconds after it
+        return _outcome(fitted, others, finding, said, settings, "", started, clock)
 
 
 def diagnose_rig(
@@ -178,9 +179,10 @@ def diagnose_rig(
         finding = replace(finding, interrupted=stopped, notes=notes)
     _, quality = _prepared(fitted, others, settings)
     finding = _budgeted(finding, fitted, settings, progress)
-    outcome = _outcome(
-        fitted, others, finding, quality, settings, address, started, clock, performed
-    )
+    with Interrupts():
+        outcome = _outcome(
+            fitted, others, finding, quality, settings, address, started, clock, performed
+        )
     return replace(outcome, ended=ended)
 
 

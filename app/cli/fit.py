@@ -322,6 +322,7 @@ def diagnose(
 
     Adds the effects found to the model and compares the errors before and after.
     """
+    from dearig.acquisition.interrupts import Interrupts
     from dearig.analysis.diagnose import diagnose_recordings, diagnose_rig
     from dearig.analysis.outcomes import save_fitted_model
     from dearig.cli.terminal import diagnosis_tables
@@ -364,16 +365,18 @@ def diagnose(
                 seed=seed, thorough=thorough, ended_early=ended_early.value, overwrite=force,
                 progress=progress,
             )  # fmt: skip
-        if model_out is not None:
-            outcome = save_fitted_model(outcome, model_out, force)
-        if report is not None:
-            progress("report", 1.0)
-            write_diagnosis_report(outcome, report)
-    console.print(diagnosis_tables(outcome))
-    for label, path in (("Model", model_out), ("Report", report)):
-        if path is not None:
-            print_line(console, f"{label}: {path}")
-    write_result(lambda: result_json(outcome), json)
+        with Interrupts():  # the first ctrl-C does not leave files out
+            if model_out is not None:
+                outcome = save_fitted_model(outcome, model_out, force)
+            if report is not None:
+                progress("report", 1.0)
+                write_diagnosis_report(outcome, report)
+    with Interrupts():
+        console.print(diagnosis_tables(outcome))
+        for label, path in (("Model", model_out), ("Report", report)):
+            if path is not None:
+                print_line(console, f"{label}: {path}")
+        write_result(lambda: result_json(outcome), json)
     _raise_early_end(outcome)
 
 
