@@ -112,7 +112,7 @@ def test_half_an_hour_of_beats_passes_and_nothing_grows(bench):
     after = guardian.memory_info().rss, guardian.num_threads()
     assert after[0] - before[0] < 1 << 20
     assert after[1] == before[1]
-    assert psutil.Process().num_threads() == own
+    assert psutil.Process().num_threads() <= own
     assert bench.guardian.report() is None
 
 
