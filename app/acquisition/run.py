@@ -369,6 +369,8 @@ class _Run:
         try:
             stopping = False
             while (block := rig.read()) is not None:
+                if not stopping and getattr(rig, "ramping", False):
+                    self._observer.ramping()
                 self._take(block)
                 self._progress("recording", recorder.received / samples)
                 trip = self._watch(block)
@@ -390,6 +392,7 @@ class _Run:
                     continue
                 stopping = True
                 rig.stop()
+                self._observer.ramping()
         except (RigError, KeyboardInterrupt):
             raise
         except BaseException:
@@ -564,8 +567,8 @@ class _Run:
         if not getattr(rig, "guardian_tries", False):
             return
         log.warning(
-            "0 V IS NOT CONFIRMED: switch the amplifier's high voltage off by hand; the guardian "
-            "goes on trying; press ctrl-C twice to stop waiting for it"
+            "0 V IS NOT CONFIRMED: switch the amplifier's high voltage off by hand; waiting for "
+            "the guardian; press ctrl-C twice to stop waiting for it"
         )
         while rig.guardian_tries and self._interrupts.count - asked < _GIVE_UP:  # type: ignore[attr-defined]
             rig.await_guardian(_GUARDIAN_POLL)  # type: ignore[attr-defined]

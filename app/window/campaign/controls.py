@@ -100,13 +100,14 @@ class CampaignControls(QWidget):
         for name, readout in self.numbers.items():
             value = math.nan if now is None else now.values.get(name, math.nan)
             readout.show_number(value * (1e-3 if name == "monitor" else 1e3), 3)
+            readout.show_past(not self._status.current)
         if now is None:
             self.progress.setValue(0)
             self.time_left.setText("")
             return
         self.progress.setValue(round(1000 * now.samples / max(now.total, 1)))
         left = max(0.0, (now.total - now.samples) / now.rate)
-        self.time_left.setText(f"{left:.1f} s left")
+        self.time_left.setText(self._status.silence or f"{left:.1f} s left")
 
     # layout
 

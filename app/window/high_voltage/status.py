@@ -26,6 +26,7 @@ from dearig.window.session.state import Session
 __all__ = [
     "ARMED_FOR",
     "REACTION",
+    "SILENT",
     "HighVoltageStatus",
     "LatchedAlarm",
     "OutputReading",
@@ -35,6 +36,8 @@ __all__ = [
 
 log = logging.getLogger(__name__)
 
+#: s without a sample, beside the time of one, after which the last one is not that of now.
+SILENT = 1.0
 ARMED_FOR = 30.0  #: s after which a rig that was armed and not started is disarmed
 _TICK = 250  # ms between two updates of the countdown
 _KEY = "alarm"  # of the settings; with the address of the rig
@@ -73,11 +76,15 @@ class LatchedAlarm:
 
 @dataclass(frozen=True)
 class OutputReading:
-    """Voltage monitor in V, and the time ``seconds`` of ``total`` s in the sequence."""
+    """Voltage monitor in V, and the time ``seconds`` of ``total`` s in the sequence.
+
+    ``interval`` is the time in s between two samples.
+    """
 
     monitor: float
     seconds: float
     total: float
+    interval: float = 0.0
 
 
 class HighVoltageStatus(QObject):
@@ -119,6 +126,8 @@ class HighVoltageStatus(QObject):
         self._ticks = QTimer(self, interval=_TICK)
         self._ticks.timeout.connect(self._tick)
         self.reading: OutputReading | None = None
+        self._read_at = 0.0  # when ``reading`` came
+        self._silence = 0  # whole s without a sample, 0 while they come
         self.run_number = 0
         self._lock: QLockFile | None = None  # while a run goes on
         self.alarm: LatchedAlarm | None = None
@@ -143,8 +152,18 @@ class HighVoltageStatus(QObject):
 
     @property
     def live(self) -> bool:
-        """True while ``reading`` is that of this moment."""
+        """True while the voltage may be up and its end is not known."""
         return self.running and not self._told
+
+    @property
+    def current(self) -> bool:
+        """True while ``reading`` is that of this moment."""
+        return self.live and not self._silence
+
+    @property
+    def silence(self) -> str:
+        """How long no sample has come during a run, in words; "" while they come."""
+        return f"no sample for {self._silence} s" if self.live and self._silence else ""
 
     @property
     def seconds_to_start(self) -> int:
@@ -167,7 +186,9 @@ class HighVoltageStatus(QObject):
         words = ""
         if self._state is HighVoltage.ARMED:
             words = f"no voltage yet; disarms in {self.seconds_to_start} s"
-        elif not self.live:
+        elif self.live:
+            words = self.silence
+        else:
             output = self.output
             words = "the voltage was not read yet" if output is None else output.sentence
             if self._state is HighVoltage.BETWEEN:
@@ -179,7 +200,7 @@ class HighVoltageStatus(QObject):
     @property
     def detail(self) -> str:
         """The same, with the voltage during a run."""
-        if self.live and self.reading is not None:
+        if self.current and self.reading is not None:
             return f"{kilovolts(self.reading.monitor)}  {self.words}".rstrip()
         return self.words
 
@@ -192,7 +213,7 @@ class HighVoltageStatus(QObject):
         if math.isnan(volts):
             return self.words
         moment = belongs_to.replace("\n", " ").replace("monitor at", "at")
-        return kilovolts(volts) if self.live else f"{kilovolts(volts)} {moment}"
+        return kilovolts(volts) if self.current else f"{kilovolts(volts)} {moment}"
 
     # what the runner reports
 
@@ -254,7 +275,7 @@ class HighVoltageStatus(QObject):
             self.set_output(output)
 
     def _forget_numbers(self) -> None:
-        self.reading = None
+        self.reading, self._silence = None, 0
         self.run_number += 1
 
     @property
@@ -266,20 +287,25 @@ class HighVoltageStatus(QObject):
         the last sample.
         """
         reading, output = self.reading, self.output
-        if self.live:
-            if reading is None:
-                return math.nan, ""
+        if self.live and reading is None:
+            return math.nan, ""
+        if self.current and reading is not None:
             return reading.monitor, f"{reading.seconds:.1f} of {reading.total:.1f} s"
-        if output is not None and output.monitor is not None:
+        if not self.live and output is not None and output.monitor is not None:
             return output.monitor, f"monitor at\n{output.time}"
         if reading is not None and self._state is not HighVoltage.BETWEEN:
             return reading.monitor, f"last sample,\n{reading.seconds:.2f} s"
         return math.nan, ""
 
     def show_reading(self, reading: OutputReading) -> None:
-        """Show the newest samples of a run."""
-        if reading != self.reading:
-            self.reading = reading
+        """Show the newest samples of a run; to be called again and again, also without new ones."""
+        now, new = _now(), reading != self.reading
+        if new:
+            self.reading, self._read_at = reading, now
+        waited = now - self._read_at
+        silence = int(waited) if self.live and waited > SILENT + reading.interval else 0
+        if new or silence != self._silence:
+            self._silence = silence
             self.changed.emit()
 
     def run_begins(self) -> None:
