@@ -191,7 +191,7 @@ class HighVoltageStatus(QObject):
         """Sentence on the state: the countdown, or what was measured and when."""
         words = ""
         if self._state is HighVoltage.ARMED:
-            words = f"no voltage yet; disarms in {self.seconds_to_start} s"
+            words = f"not started yet; disarms in {self.seconds_to_start} s"
         elif self.live:
             words = self.silence
         else:
@@ -216,7 +216,7 @@ class HighVoltageStatus(QObject):
     def brief(self) -> str:
         """What fits below the state: the voltage and its moment, or the time to start."""
         if self._state is HighVoltage.ARMED:
-            return f"no voltage yet; disarms in {self.seconds_to_start} s"
+            return f"not started yet; disarms in {self.seconds_to_start} s"
         volts, belongs_to = self.number
         if math.isnan(volts):
             return self.words
