@@ -91,6 +91,9 @@ class Rig(Protocol):
     where the monitor could not be read. Without it, the end of a run counts as confirmed only by
     the last samples.
 
+    A rig that ends runs early of its own accord has a property ``ramping``: True once it plays the
+    ramp of a ``stop``.
+
     A rig with the attribute ``plays_growing_waveforms = True`` also plays a waveform that grows: it
     outputs only what is admitted, takes what was admitted since the last ``read`` with the next
     one, and raises ``RigError`` where nothing is left to output. Without it no run is corrected.

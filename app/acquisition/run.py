@@ -25,6 +25,7 @@ from dearig.acquisition.plan import plan
 from dearig.acquisition.rigs import is_simulated, kind_of, options_of
 from dearig.acquisition.room import RoomOfRun, open_room
 from dearig.acquisition.run_parts import RunObserver, RunOptions, RunResult
+from dearig.clock import ClockWatch
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.drivers.errors import AddressError, NotAtZero, RefusedWaveform, RigError
@@ -290,6 +291,7 @@ class _Run:
         self._unknown_since: float | None = None
         self._progress = progress
         self._clock = clock
+        self._clock_watch = ClockWatch()
         self._unread = 0.0  # s of samples that wait for this program
         self._events: list[str] = []
         self._trip: Trip | None = None  # the first one; later ones follow from it
@@ -369,6 +371,8 @@ class _Run:
         try:
             stopping = False
             while (block := rig.read()) is not None:
+                if not stopping and getattr(rig, "ramping", False):
+                    self._observer.ramping()
                 self._take(block)
                 self._progress("recording", recorder.received / samples)
                 trip = self._watch(block)
@@ -390,6 +394,7 @@ class _Run:
                     continue
                 stopping = True
                 rig.stop()
+                self._observer.ramping()
         except (RigError, KeyboardInterrupt):
             raise
         except BaseException:
@@ -412,6 +417,8 @@ class _Run:
     def _watch(self, block: Block) -> Trip | None:
         """Return the interlock that trips now, if any; every one is recorded as an event."""
         self._tell_notices()
+        if change := self._clock_watch.change():
+            self._note(self._recorder.received, "warning", change)
         free = self._recorder.free_bytes()
         # every conversion is checked, not the mean of a row
         trips = [self._in_rows(trip) for trip in self._interlocks.watch(block)]
@@ -564,8 +571,8 @@ class _Run:
         if not getattr(rig, "guardian_tries", False):
             return
         log.warning(
-            "0 V IS NOT CONFIRMED: switch the amplifier's high voltage off by hand; the guardian "
-            "goes on trying; press ctrl-C twice to stop waiting for it"
+            "0 V IS NOT CONFIRMED: switch the amplifier's high voltage off by hand; waiting for "
+            "the guardian; press ctrl-C twice to stop waiting for it"
         )
         while rig.guardian_tries and self._interrupts.count - asked < _GIVE_UP:  # type: ignore[attr-defined]
             rig.await_guardian(_GUARDIAN_POLL)  # type: ignore[attr-defined]

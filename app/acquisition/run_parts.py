@@ -109,6 +109,9 @@ class RunObserver:
     def event(self, event: Event) -> None:
         """Receive an event that is in the recording."""
 
+    def ramping(self) -> None:
+        """Receive that the voltage is ramped down, whatever the cause; it may come repeatedly."""
+
     def output(self, state: OutputState) -> None:
         """Receive what is known of the output after the run.
 

@@ -154,6 +154,9 @@ class GuardianProcess:
         self._clock = clock
         self._guards = self._trying = self._failed = False
         self._reports_before = 0  # those before the last ``take_over``
+        self._tries_until = 0.0  # time at which its outcome must be there
+        # s: its attempts, and the calls that the last of them makes without an answer
+        self._tries_for = settings.guardian.retry_s + 3.0 * settings.guardian.link_timeout_s
         self._news = threading.Condition()  # guards what the listener changes, down to _ended
         self._unheard: deque[float] = deque()  # times of the words that are not acknowledged
         self._overdue = False  # True after a word was not acknowledged in time
@@ -276,15 +279,22 @@ class GuardianProcess:
 
     def take_over(self) -> TakeOver:
         """Request 0 V now. Raises ``RigError`` where the guardian does not set it."""
-        if self._trying:
+        if self.tries:
             raise RigError("the guardian process is still trying to reach the card")
         if self._failed:
             raise RigError("the guardian process could not take the output to 0 V either")
         self._reports_before = self._reports
-        if not self._ask("take over"):
+        # one that has seen the run freeze is in its attempts already, and hears nothing meanwhile
+        heard = self._ask("take over")
+        if not heard and self._process.poll() is not None:
             raise RigError(f"the guardian process gives no answer either ({self.fault()})")
-        self._trying = True
+        self._trying, self._tries_until = True, self._clock() + self._tries_for
         report = self.outcome(_TAKES_OVER_WITHIN)
+        if report is None and not heard:
+            raise RigError(
+                f"the guardian process has not taken the output to 0 V within "
+                f"{_TAKES_OVER_WITHIN:g} s either: it tries, or is stopped"
+            )
         if report is None:
             raise RigError(
                 f"the guardian process has not taken the output to 0 V within "
@@ -296,7 +306,12 @@ class GuardianProcess:
 
     @property
     def tries(self) -> bool:
-        """Return True from a ``take_over`` that was not answered in time until its outcome."""
+        """Return True from a ``take_over`` that was not answered in time until its outcome.
+
+        One that does not answer for longer than its attempts take is stopped.
+        """
+        if self._trying and self._clock() >= self._tries_until:
+            self._trying, self._failed = False, True
         return self._trying
 
     def outcome(self, within: float) -> TakeOver | None:
@@ -317,7 +332,7 @@ class GuardianProcess:
         if self._process.stdin is not None:
             with contextlib.suppress(OSError):  # it has ended and closed its end of the pipe
                 self._process.stdin.close()
-        if self._trying:
+        if self.tries:
             return
         # one that does not answer is stopped; it must not wake up in a later run
         ends = self.answered(_ANSWERS_WITHIN) or self._ended

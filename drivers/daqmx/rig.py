@@ -108,6 +108,12 @@ class DaqmxRig:
         return self._outputs.zero_reading
 
     @property
+    def ramping(self) -> bool:
+        """Return True once the run has been stopped, such as for a guardian without an answer."""
+        run = self._run
+        return run is not None and run.stopped
+
+    @property
     def guardian_tries(self) -> bool:
         """Return True while the guardian still tries to set 0 V, after ``make_safe`` failed."""
         return self._guardian.tries

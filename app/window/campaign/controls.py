@@ -100,13 +100,14 @@ class CampaignControls(QWidget):
         for name, readout in self.numbers.items():
             value = math.nan if now is None else now.values.get(name, math.nan)
             readout.show_number(value * (1e-3 if name == "monitor" else 1e3), 3)
+            readout.show_past(not self._status.current)
         if now is None:
             self.progress.setValue(0)
             self.time_left.setText("")
             return
         self.progress.setValue(round(1000 * now.samples / max(now.total, 1)))
         left = max(0.0, (now.total - now.samples) / now.rate)
-        self.time_left.setText(f"{left:.1f} s left")
+        self.time_left.setText(self._status.silence or f"{left:.1f} s left")
 
     # layout
 
@@ -149,7 +150,7 @@ class CampaignControls(QWidget):
         steps = QHBoxLayout()
         steps.addWidget(self.paced)
         steps.addStretch(1)
-        self.arm = StepButton("1  Arm", "First step: no voltage yet", "F5", self, self._status)
+        self.arm = StepButton("1  Arm", "First step: no output yet", "F5", self, self._status)
         self.arm.setCheckable(True)
         self.start = StepButton("2  Start", "Second step: play the batch", "F6", self, self._status)
         for step in (self.arm, self.start):

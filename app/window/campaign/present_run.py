@@ -81,9 +81,9 @@ class PresentRun(QWidget):
     @Slot()
     def _show_numbers(self) -> None:
         now = None if self._live is None or not self._status.live else self._live.now()
-        self._controls.show_numbers(now)
         if now is not None:
             monitor = now.values.get("monitor", float("nan"))
             self._status.show_reading(
-                OutputReading(monitor, now.samples / now.rate, now.total / now.rate)
+                OutputReading(monitor, now.samples / now.rate, now.total / now.rate, 1.0 / now.rate)
             )
+        self._controls.show_numbers(now)

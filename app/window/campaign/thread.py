@@ -170,6 +170,9 @@ class CampaignObserver(RunObserver):
         if self._thread.live is not None:
             self._thread.live.event(event)
 
+    def ramping(self) -> None:
+        self._thread.ramping.emit()
+
     def output(self, state: OutputState) -> None:
         self._thread.output = state
         self._thread.output_known.emit(state)

@@ -163,7 +163,7 @@ class HighVoltageBar(QFrame):
         volts, belongs_to = status.number
         self.monitor.setText("— kV" if math.isnan(volts) else kilovolts(volts))
         self.time.setText(belongs_to)
-        set_role(self.monitor, "" if status.live else "muted")
+        set_role(self.monitor, "" if status.current else "muted")
         alarm = status.alarm
         self.alarm.setVisible(alarm is not None)
         self.acknowledge_button.setVisible(alarm is not None)

@@ -17,6 +17,7 @@ from pathlib import Path
 from PySide6.QtCore import QLockFile, QObject, Qt, QTimer, Signal, Slot
 
 from dearig.acquisition.rigs import is_simulated
+from dearig.clock import ClockWatch
 from dearig.output_state import Known, OutputState
 from dearig.window.high_voltage.state import HighVoltage, kilovolts, state_at_rest
 from dearig.window.session.recovery import lock_of, unsaved_folder
@@ -26,6 +27,7 @@ from dearig.window.session.state import Session
 __all__ = [
     "ARMED_FOR",
     "REACTION",
+    "SILENT",
     "HighVoltageStatus",
     "LatchedAlarm",
     "OutputReading",
@@ -35,7 +37,10 @@ __all__ = [
 
 log = logging.getLogger(__name__)
 
+#: s without a sample, beside the time of one, after which the last one is not that of now.
+SILENT = 1.0
 ARMED_FOR = 30.0  #: s after which a rig that was armed and not started is disarmed
+_CLOCK = 1.0  # s between two looks at the computer's clock
 _TICK = 250  # ms between two updates of the countdown
 _KEY = "alarm"  # of the settings; with the address of the rig
 _BLOCK = "alarm"  # of the session
@@ -73,11 +78,15 @@ class LatchedAlarm:
 
 @dataclass(frozen=True)
 class OutputReading:
-    """Voltage monitor in V, and the time ``seconds`` of ``total`` s in the sequence."""
+    """Voltage monitor in V, and the time ``seconds`` of ``total`` s in the sequence.
+
+    ``interval`` is the time in s between two samples.
+    """
 
     monitor: float
     seconds: float
     total: float
+    interval: float = 0.0
 
 
 class HighVoltageStatus(QObject):
@@ -118,7 +127,13 @@ class HighVoltageStatus(QObject):
         self._opening.timeout.connect(self._open_start)
         self._ticks = QTimer(self, interval=_TICK)
         self._ticks.timeout.connect(self._tick)
+        self._clock_watch = ClockWatch()
+        self._clock_looks = QTimer(self, interval=round(1000 * _CLOCK))
+        self._clock_looks.timeout.connect(self._look_at_clock)
+        self._clock_looks.start()
         self.reading: OutputReading | None = None
+        self._read_at = 0.0  # when ``reading`` came
+        self._silence = 0  # whole s without a sample, 0 while they come
         self.run_number = 0
         self._lock: QLockFile | None = None  # while a run goes on
         self.alarm: LatchedAlarm | None = None
@@ -143,8 +158,18 @@ class HighVoltageStatus(QObject):
 
     @property
     def live(self) -> bool:
-        """True while ``reading`` is that of this moment."""
+        """True while the voltage may be up and its end is not known."""
         return self.running and not self._told
+
+    @property
+    def current(self) -> bool:
+        """True while ``reading`` is that of this moment."""
+        return self.live and not self._silence
+
+    @property
+    def silence(self) -> str:
+        """How long no sample has come during a run, in words; "" while they come."""
+        return f"no sample for {self._silence} s" if self.live and self._silence else ""
 
     @property
     def seconds_to_start(self) -> int:
@@ -166,10 +191,14 @@ class HighVoltageStatus(QObject):
         """Sentence on the state: the countdown, or what was measured and when."""
         words = ""
         if self._state is HighVoltage.ARMED:
-            words = f"no voltage yet; disarms in {self.seconds_to_start} s"
-        elif not self.live:
+            words = f"not started yet; disarms in {self.seconds_to_start} s"
+        elif self.live:
+            words = self.silence
+        else:
             output = self.output
             words = "the voltage was not read yet" if output is None else output.sentence
+            if output is not None and output.at > time.time() + _CLOCK:
+                words = f"{words}; the computer's clock was set back since then"
             if self._state is HighVoltage.BETWEEN:
                 words = f"{words}; {self._next}"
         simulated = is_simulated(self._session.address)
@@ -179,7 +208,7 @@ class HighVoltageStatus(QObject):
     @property
     def detail(self) -> str:
         """The same, with the voltage during a run."""
-        if self.live and self.reading is not None:
+        if self.current and self.reading is not None:
             return f"{kilovolts(self.reading.monitor)}  {self.words}".rstrip()
         return self.words
 
@@ -187,12 +216,12 @@ class HighVoltageStatus(QObject):
     def brief(self) -> str:
         """What fits below the state: the voltage and its moment, or the time to start."""
         if self._state is HighVoltage.ARMED:
-            return f"no voltage yet; disarms in {self.seconds_to_start} s"
+            return f"not started yet; disarms in {self.seconds_to_start} s"
         volts, belongs_to = self.number
         if math.isnan(volts):
             return self.words
         moment = belongs_to.replace("\n", " ").replace("monitor at", "at")
-        return kilovolts(volts) if self.live else f"{kilovolts(volts)} {moment}"
+        return kilovolts(volts) if self.current else f"{kilovolts(volts)} {moment}"
 
     # what the runner reports
 
@@ -254,7 +283,7 @@ class HighVoltageStatus(QObject):
             self.set_output(output)
 
     def _forget_numbers(self) -> None:
-        self.reading = None
+        self.reading, self._silence = None, 0
         self.run_number += 1
 
     @property
@@ -266,20 +295,25 @@ class HighVoltageStatus(QObject):
         the last sample.
         """
         reading, output = self.reading, self.output
-        if self.live:
-            if reading is None:
-                return math.nan, ""
+        if self.live and reading is None:
+            return math.nan, ""
+        if self.current and reading is not None:
             return reading.monitor, f"{reading.seconds:.1f} of {reading.total:.1f} s"
-        if output is not None and output.monitor is not None:
+        if not self.live and output is not None and output.monitor is not None:
             return output.monitor, f"monitor at\n{output.time}"
         if reading is not None and self._state is not HighVoltage.BETWEEN:
             return reading.monitor, f"last sample,\n{reading.seconds:.2f} s"
         return math.nan, ""
 
     def show_reading(self, reading: OutputReading) -> None:
-        """Show the newest samples of a run."""
-        if reading != self.reading:
-            self.reading = reading
+        """Show the newest samples of a run; to be called again and again, also without new ones."""
+        now, new = _now(), reading != self.reading
+        if new:
+            self.reading, self._read_at = reading, now
+        waited = now - self._read_at
+        silence = int(waited) if self.live and waited > SILENT + reading.interval else 0
+        if new or silence != self._silence:
+            self._silence = silence
             self.changed.emit()
 
     def run_begins(self) -> None:
@@ -352,6 +386,14 @@ class HighVoltageStatus(QObject):
         if _now() >= self._deadline:
             self.disarm_due.emit()
         else:
+            self.changed.emit()
+
+    @Slot()
+    def _look_at_clock(self) -> None:
+        """Say that the computer's clock was set: the bar shows times of day."""
+        if change := self._clock_watch.change():
+            log.warning("%s", change)
+            self._session.message.emit(f"{change[0].upper()}{change[1:]}")
             self.changed.emit()
 
     @Slot()

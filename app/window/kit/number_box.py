@@ -11,7 +11,7 @@ import re
 
 from PySide6.QtCore import QLocale, Slot
 from PySide6.QtGui import QValidator
-from PySide6.QtWidgets import QDoubleSpinBox, QSpinBox
+from PySide6.QtWidgets import QDoubleSpinBox
 
 from dearig.window.kit.number_text import NumberTextError, read_number
 from dearig.window.kit.widgets import set_wrong
@@ -23,6 +23,8 @@ _TYPED = re.compile(r"[-+0-9.,'\u2019_ ]*")
 
 class NumberBox(QDoubleSpinBox):
     """Takes a number from ``low`` to ``high``, with a decimal point or a decimal comma."""
+
+    WHOLE = False  #: True where only whole numbers are taken
 
     def __init__(
         self, low: float, high: float, value: float, *, decimals: int, unit: str = ""
@@ -41,7 +43,11 @@ class NumberBox(QDoubleSpinBox):
         return super().value()
 
     def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
-        return _state(text, self._number(text), self.suffix()), text, at
+        if self._number(text) is not None:
+            return QValidator.State.Acceptable, text, at
+        # a key that is dropped would change the number
+        typed = _TYPED.fullmatch(text.removesuffix(self.suffix()))
+        return QValidator.State.Intermediate if typed else QValidator.State.Invalid, text, at
 
     def fixup(self, text: str) -> str:
         return text  # Qt would leave out what may be a decimal sign
@@ -51,60 +57,26 @@ class NumberBox(QDoubleSpinBox):
         return super().value() if number is None else number
 
     def _number(self, text: str) -> float | None:
-        return _read(text.removesuffix(self.suffix()), self.minimum(), self.maximum())
+        try:
+            number = read_number(text.removesuffix(self.suffix()), self.WHOLE)
+        except NumberTextError:
+            return None
+        taken = self.minimum() <= number <= self.maximum()
+        return number if taken and not (self.WHOLE and number % 1) else None
 
     @Slot()
     def _mark(self) -> None:
         set_wrong(self, self._number(self.lineEdit().text()) is None)
 
 
-class WholeBox(QSpinBox):
+class WholeBox(NumberBox):
     """Takes a whole number from ``low`` to ``high``."""
 
+    WHOLE = True
+
     def __init__(self, low: int, high: int, value: int) -> None:
-        super().__init__(minimum=low, maximum=high, value=value)
-        self.setLocale(QLocale.c())
-        self.setCorrectionMode(QSpinBox.CorrectionMode.CorrectToPreviousValue)
-        self.setKeyboardTracking(False)  # else the last number is that of half a text
-        self.lineEdit().textChanged.connect(self._mark)
-        self.editingFinished.connect(self._mark)
+        super().__init__(low, high, value, decimals=0)
 
     def value(self) -> int:
-        """Return the number that is shown; the last one where the text is no number."""
-        self.interpretText()
-        self._mark()
-        return super().value()
-
-    def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
-        return _state(text, self._number(text), ""), text, at
-
-    def fixup(self, text: str) -> str:
-        return text  # Qt would leave out what may be a decimal sign
-
-    def valueFromText(self, text: str) -> int:  # noqa: N802
-        number = self._number(text)
-        return super().value() if number is None else number
-
-    def _number(self, text: str) -> int | None:
-        found = _read(text, self.minimum(), self.maximum(), whole=True)
-        return None if found is None or found != int(found) else int(found)
-
-    @Slot()
-    def _mark(self) -> None:
-        set_wrong(self, self._number(self.lineEdit().text()) is None)
-
-
-def _read(text: str, low: float, high: float, *, whole: bool = False) -> float | None:
-    try:
-        number = read_number(text, whole)
-    except NumberTextError:
-        return None
-    return number if low <= number <= high else None
-
-
-def _state(text: str, number: float | None, suffix: str) -> QValidator.State:
-    if number is not None:
-        return QValidator.State.Acceptable
-    # a key that is dropped would change the number
-    typed = _TYPED.fullmatch(text.removesuffix(suffix))
-    return QValidator.State.Intermediate if typed else QValidator.State.Invalid
+        """Return the number that is shown; the last one where the text is no whole number."""
+        return int(super().value())

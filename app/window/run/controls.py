@@ -30,8 +30,9 @@ _SIGNALS = {
     "displacement": (1e3, 4),
 }
 
-#: What a run waits for whose output is known: its end, or a guardian that goes on trying.
+#: What a run waits for that is being ended: its ramp, its end, or a guardian that goes on trying.
 _ENDING = {
+    HighVoltage.RAMPING: "Ramping down to 0 V",
     HighVoltage.CONFIRMED: "At 0 V, the recording is being closed",
     HighVoltage.COMMANDED: "0 V not confirmed, the run is ending",
     HighVoltage.UNKNOWN: "Output unknown, the run is ending",
@@ -98,7 +99,7 @@ class RunControls(QWidget):
         self._status = status
         self._numbers_of = status.run_number  # that the readouts belong to
         self.badge = HighVoltageBadge(large=True)
-        self.arm_button = StepButton("1  Arm", "First step: no voltage yet", "F5", self, status)
+        self.arm_button = StepButton("1  Arm", "First step: no output yet", "F5", self, status)
         self.arm_button.setCheckable(True)
         self.start_button = StepButton(
             "2  Start", "Second step: play and record the sequence", "F6", self, status
@@ -156,12 +157,12 @@ class RunControls(QWidget):
         """Say what moment the readouts belong to; at rest they must not contradict the state."""
         status, reading = self._status, self._status.reading
         known = reading is not None and self._numbers_of == status.run_number
-        past, output = known and not status.live, status.output
+        past, output = known and not status.current, status.output
         if not known or reading is None:
             text = ""
-        elif status.live:
+        elif status.current:
             text = "now"
-        elif output is not None and output.monitor is not None:
+        elif not status.live and output is not None and output.monitor is not None:
             text = f"monitor at {output.time}"
             for name in _SIGNALS:
                 volts = output.monitor if name == "monitor" else math.nan
@@ -198,9 +199,10 @@ class RunControls(QWidget):
 
     def show_progress(self, now: RunSnapshot, segment: str) -> None:
         """Show how far the run is and what plays; once its output is known, what is waited for."""
-        if not self._status.live:
-            state = self._status.state
-            self.time_left.setText(_ENDING.get(state, state.value.capitalize()))
+        status = self._status
+        if not status.current or status.state is HighVoltage.RAMPING:
+            words = status.silence or _ENDING.get(status.state, status.state.value)
+            self.time_left.setText(words[:1].upper() + words[1:])
             self.segment.show_text("")
             return
         left = max(0.0, (now.total - now.samples) / now.rate)

@@ -267,7 +267,7 @@ class RunPage(Page):
         if self.runner.running:
             seconds, total = now.samples / now.rate, now.total / now.rate
             monitor = now.values.get("monitor", float("nan"))
-            self.runner.status.show_reading(OutputReading(monitor, seconds, total))
+            self.runner.status.show_reading(OutputReading(monitor, seconds, total, 1.0 / now.rate))
             playing = next((s[0] for s in self._segments if s[1] <= seconds < s[2]), "")
             self.controls.show_progress(now, playing)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -123,10 +122,12 @@ class RunEnd:
 class PlayThread(QThread):
     """Thread that plays something; its subclass sets ``end`` and obeys ``interrupts``.
 
-    ``output_known`` carries the ``OutputState`` at the end of a run.
+    ``output_known`` carries the ``OutputState`` at the end of a run. ``ramping`` comes when a run
+    is ramped down, whatever the cause, and may come repeatedly.
     """
 
     output_known = Signal(object)
+    ramping = Signal()
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
@@ -211,6 +212,7 @@ class Runner(QObject):
         self.status.run_begins()
         self._thread, self.playing = thread, play
         thread.output_known.connect(self.status.set_output)
+        thread.ramping.connect(self._ramps)
         thread.finished.connect(self._finished)
         # the samples of the rig must be read in time, whatever the interface draws
         thread.start(QThread.Priority.TimeCriticalPriority)
@@ -230,8 +232,12 @@ class Runner(QObject):
             self._thread.interrupts.ask_at_once()
         else:
             self._thread.interrupts.ask()
-            if self.status.live:
-                self.status.set_phase(HighVoltage.RAMPING)
+            self._ramps()
+
+    @Slot()
+    def _ramps(self) -> None:
+        if self.status.live:
+            self.status.set_phase(HighVoltage.RAMPING)
 
     def disarm(self, cause: str) -> None:
         """Disarm, if the rig is armed; ``cause`` says why, for the bar."""
@@ -277,11 +283,11 @@ def _alarm(end: RunEnd, address: str) -> LatchedAlarm:
 
 
 class LiveObserver(RunObserver):
-    """Hands everything on to ``live``, and what is known of the output to ``tell`` too."""
+    """Hands everything on to ``live``; a ramp, and what is known of the output, to ``thread``."""
 
-    def __init__(self, live: Live, tell: Callable[[OutputState], None]) -> None:
+    def __init__(self, live: Live, thread: PlayThread) -> None:
         self._live = live
-        self._tell = tell
+        self._thread = thread
         self.output_state: OutputState | None = None
 
     def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
@@ -299,9 +305,12 @@ class LiveObserver(RunObserver):
     def event(self, event: Event) -> None:
         self._live.event(event)
 
+    def ramping(self) -> None:
+        self._thread.ramping.emit()
+
     def output(self, state: OutputState) -> None:
         self.output_state = state
-        self._tell(state)
+        self._thread.output_known.emit(state)
 
 
 class _RunThread(PlayThread):
@@ -324,7 +333,7 @@ class _RunThread(PlayThread):
                 None,
             )
             return
-        observer = LiveObserver(self._live, self.output_known.emit)
+        observer = LiveObserver(self._live, self)
         try:
             options = RunOptions(
                 order.configuration, order.operator, order.film, order.notes,

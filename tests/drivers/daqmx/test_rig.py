@@ -228,6 +228,7 @@ def test_a_dead_guardian_ramps_the_run_down(bench):
     def go_on() -> None:
         while (block := bench.rig.read()) is not None:
             blocks.append(block)
+            assert bench.rig.ramping == (len(blocks) > 2)
             bench.guardian.dead = len(blocks) > 1
 
     begin(bench.rig, LONG)

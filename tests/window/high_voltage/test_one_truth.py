@@ -105,6 +105,31 @@ def test_no_other_rig_while_something_plays(
     assert window.bar.badge.state is HighVoltage.NOT_CONTACTED
 
 
+def test_a_number_is_not_of_now_once_no_samples_come(
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr("dearig.window.high_voltage.status._now", lambda: now[0])
+    status, bar = window.run_page.runner.status, window.bar
+    status.set_phase(HighVoltage.ON)
+    reading = OutputReading(4520.0, 2.1, 25.8, 0.001)
+    for waited, moment, silence in (
+        (0.0, "2.1 of 25.8 s", ""),
+        (0.9, "2.1 of 25.8 s", ""),
+        (3.2, "last sample,\n2.10 s", "no sample for 3 s"),
+        (61.0, "last sample,\n2.10 s", "no sample for 61 s"),
+    ):
+        now[0] = 100.0 + waited
+        status.show_reading(reading)
+        assert bar.badge.state is HighVoltage.ON
+        assert (bar.monitor.text(), bar.time.text()) == ("4.52 kV", moment)
+        assert silence in bar.detail.text()
+        assert status.current == (silence == "")
+    status.show_reading(OutputReading(4510.0, 63.1, 99.0, 0.001))
+    assert (bar.time.text(), status.silence) == ("63.1 of 99.0 s", "")
+    status.set_phase(None)
+
+
 def test_the_number_at_rest_is_the_one_that_confirmed_zero_volts(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:

@@ -217,12 +217,12 @@ def test_a_second_stop_is_0_volts_at_once(qtbot: QtBot, window: MainWindow) -> N
 
 
 @pytest.mark.parametrize(
-    ("fault", "headline", "words"),
+    ("fault", "headline", "words", "ramps"),
     [
-        ("arc@1+0.5", "Stopped by an interlock", "breakdown"),
-        ("sensor-out-of-range@1", "Stopped by an interlock", "laser"),
-        ("electrode-open@0", "Stopped by an interlock", "follow"),
-        ("ai-overflow@1", "Instrument fault", "overwritten"),
+        ("arc@1+0.5", "Stopped by an interlock", "breakdown", False),
+        ("sensor-out-of-range@1", "Stopped by an interlock", "laser", True),
+        ("electrode-open@0", "Stopped by an interlock", "follow", True),
+        ("ai-overflow@1", "Instrument fault", "overwritten", False),
     ],
 )
 def test_what_goes_wrong_is_said_and_the_rig_is_safe(
@@ -232,14 +232,18 @@ def test_what_goes_wrong_is_said_and_the_rig_is_safe(
     fault: str,
     headline: str,
     words: str,
+    ramps: bool,
 ) -> None:
     page = run_page
     plan_of(SHORT.replace("frequency_Hz = 2.0", "frequency_Hz = 0.2"))
+    states: list[HighVoltage] = []
+    page.runner.state_changed.connect(states.append)
     page.faults = (fault,)
     path = play(qtbot, page)
     assert page.result.text().startswith(headline)
     assert words in page.result.text() + " ".join(a.message for a in page.alarms.alarms)
     assert page.runner.state is HighVoltage.CONFIRMED
+    assert (HighVoltage.RAMPING in states) == ramps  # also where nobody has pressed STOP
     recording = open_recording(path)
     assert recording.events
     assert recording.outcome != "finished"
