@@ -256,7 +256,8 @@ def extra(name, p, film, drive):
 
     def flowing():
         def slope(u, z):
-            over = max(abs(z) / p["reach"] - p["threshold"], 0.0) / (1.0 - p["threshold"])
+            none = p.get("threshold", 0.0)
+            over = max(abs(z) / p["reach"] - none, 0.0) / (1.0 - none)
             return u - math.copysign(0.01 * over ** p["exponent"], z)
 
         return Extra(
@@ -618,6 +619,7 @@ def extra(name, p, film, drive):
                 / (0.1 / (abs(u) + p["linear_below"])) ** (p["exponent"] - 1.0)
             )
         ),
+        "nonlinear creep": flowing,
         "viscoplastic flow": flowing,
         "moist electrodes": moist_electrodes,
         "moist leakage": moist_leakage,

@@ -1,10 +1,9 @@
-"""Viscoplastic flow of the film: a stress that flows, beyond a threshold or without one.
+"""Viscoplastic flow of the film: beyond a threshold, a stress flows with a power of its excess.
 
-A spring in series with a dashpot whose rate is a power of the stress (Norton; Bergstrom and
-Boyce), beyond a threshold (Perzyna), beside the network. The elastic stretch z obeys
-z' = lam' -+ u ((|z|/r - s)/(1 - s))^n with u = 0.01/s, and the stress is Y z/r: Y is what the
-element bears while the film is stretched at u. With s = 0 and n = 1 it is a Maxwell branch; with s
-near 1, or a large n, an ideal yielding element.
+A spring in series with a dashpot and a slider side by side (Perzyna), beside the network. The
+elastic stretch z obeys z' = lam' -+ u ((|z|/r - s)/(1 - s))^n with u = 0.01/s, and the stress is
+Y z/r: Y is what the element bears while the film is stretched at u. With n = 1 it is Bingham's
+element; with s near 1, or a large n, an ideal yielding one. ``nonlinear_creep`` has no threshold.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ EFFECT = Effect(
     name="viscoplastic flow",
     family="viscoplasticity",
     acts_on="film stress",
-    summary="the film flows with a power of the stress, beyond a threshold or without one",
+    summary="beyond a stress the film flows with a power of the excess, and keeps a set",
     law=Law(
         equations=(
             r"\sigma = \sigma_0 + Y \frac{z}{r}",
@@ -30,7 +29,7 @@ EFFECT = Effect(
             ),
         ),
         symbols=("Y", "r", "s", "n"),
-        source="P. Perzyna, Adv. Appl. Mech. 9, 243 (1966); with s = 0 Norton's law of creep",
+        source="P. Perzyna, Adv. Appl. Mech. 9, 243 (1966)",
         where=(("z", "elastic stretch of the element"), ("r", "that at which it bears Y")),
     ),
     parameters=(
@@ -40,8 +39,8 @@ EFFECT = Effect(
             starts=(5e-3, 1.5e-3, 1.5e-2), logarithmic=True,
         ),
         Parameter(
-            "threshold", "", (0.0, 0.99), "part of that stress below which nothing flows", 0.1,
-            starts=(0.5, 0.0),
+            "threshold", "", (0.1, 0.99), "part of that stress below which nothing flows", 0.1,
+            starts=(0.5,),
         ),
         Parameter(
             "exponent", "", (1.0, 20.0), "of the rate over the stress", 2.0,
@@ -61,16 +60,16 @@ _PARTS = 200  # of a step: 20 reaches, far beyond which the film flows steadily
 
 
 @jit
-def _relaxed(c, k, z, h):
+def _relaxed(z, h, reach, threshold, exponent):
     """Elastic stretch after ``h`` s without travel."""
-    edge = c[k + 2] * c[k + 1]
-    width, more = c[k + 1] - edge, c[k + 3] - 1.0
+    edge = threshold * reach
+    width, more = reach - edge, exponent - 1.0
     over = (abs(z) - edge) / width
     if over <= 0.0:
         return z
     late = h * _RATE / width * over**more
-    if c[k + 3] * late < _LITTLE:
-        left = 1.0 - late * (1.0 - 0.5 * (more + 1.0) * late)
+    if exponent * late < _LITTLE:
+        left = 1.0 - late * (1.0 - 0.5 * exponent * late)
     elif more < _NEARLY_LINEAR:
         left = math.exp(-late)
     else:
@@ -79,22 +78,22 @@ def _relaxed(c, k, z, h):
 
 
 @jit
-def _flowed(c, k, z, travel, since):
+def flowed(z, travel, since, reach, threshold, exponent):
     """Elastic stretch after ``since`` s, in which the film is stretched steadily by ``travel``.
 
     It relaxes for half of each part of the step, is stretched, and relaxes for the other half.
     """
-    parts = 1 + int(min(abs(travel) / (_TRAVEL * c[k + 1]), _PARTS))
+    parts = 1 + int(min(abs(travel) / (_TRAVEL * reach), _PARTS))
     h = since / parts
-    z = _relaxed(c, k, z, 0.5 * h)
+    z = _relaxed(z, 0.5 * h, reach, threshold, exponent)
     for _ in range(parts - 1):
-        z = _relaxed(c, k, z + travel / parts, h)
-    return _relaxed(c, k, z + travel / parts, 0.5 * h)
+        z = _relaxed(z + travel / parts, h, reach, threshold, exponent)
+    return _relaxed(z + travel / parts, 0.5 * h, reach, threshold, exponent)
 
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    return c[k] / c[k + 1] * _flowed(c, k, m[j], lam - lam0, since)
+    return c[k] / c[k + 1] * flowed(m[j], lam - lam0, since, c[k + 1], c[k + 2], c[k + 3])
 
 
 @jit
@@ -104,5 +103,5 @@ def stiffness(c, k, m, j, lam, rate):
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    m[j] = _flowed(c, k, m[j], lam - lam0, h)
+    m[j] = flowed(m[j], lam - lam0, h, c[k + 1], c[k + 2], c[k + 3])
     return 0
