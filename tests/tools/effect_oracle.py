@@ -203,7 +203,7 @@ def extra(name, p, film, drive):
             slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
         )
 
-    def leakage(conductivity, widening=lambda lam: 1.0):
+    def leakage(conductivity, widening=lambda lam: 1.0, fading=lambda z, v: 1.0, **state):
         def lost(v, lam):
             return v * conductivity(v * lam / 8e3) * widening(lam)
 
@@ -213,9 +213,22 @@ def extra(name, p, film, drive):
         def left(t, lam, u, z, v):
             if v <= 0.0:
                 return 0.0
-            return brentq(lambda at: at + whole * lost(at, lam) - v, 0.0, v, xtol=1e-9, rtol=1e-12)
+            now = whole * fading(z, v)
+            return brentq(lambda at: at + now * lost(at, lam) - v, 0.0, v, xtol=1e-9, rtol=1e-12)
 
-        return Extra(voltage=left)
+        return Extra(voltage=left, **state)
+
+    def fading():
+        times = p["time_constant"] * np.array([1.0, 10.0, 100.0])
+        shares = np.array([1.0, 0.1, 0.01]) ** p["exponent"]
+        shares *= p["absorption"] / 8e3 / shares.sum()
+        return leakage(
+            lambda e: e ** p["growth"],
+            lambda lam: lam ** (p["growth"] + 2.0),
+            lambda z, v: max(1.0 + float(shares @ (v - np.array(z))), 0.0),
+            states=3,
+            slopes=lambda t, lam, u, z, v: tuple((v - np.array(z)) / times),
+        )
 
     def elastoplastic():
         return Extra(
@@ -555,6 +568,7 @@ def extra(name, p, film, drive):
         "space-charge leakage": lambda: leakage(
             lambda e: e ** p["growth"], lambda lam: lam ** (p["growth"] + 2.0)
         ),
+        "fading leakage": fading,
         "linear drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u),
         "mixed drag": lambda: Extra(
             stress=lambda t, lam, u, z, v: p["drag"] * u + p["quadratic"] * u * abs(u)

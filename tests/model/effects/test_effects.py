@@ -228,6 +228,7 @@ SPLITTING = {
     "leakage": 0.15,  # loses by the stretch amid the step
     "hopping leakage": 0.15,  # the same
     "space-charge leakage": 0.3,  # the same, by its third power and more
+    "fading leakage": 0.3,  # the same
 }
 
 
