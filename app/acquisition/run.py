@@ -25,6 +25,7 @@ from dearig.acquisition.plan import plan
 from dearig.acquisition.rigs import is_simulated, kind_of, options_of
 from dearig.acquisition.room import RoomOfRun, open_room
 from dearig.acquisition.run_parts import RunObserver, RunOptions, RunResult
+from dearig.clock import ClockWatch
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.drivers.errors import AddressError, NotAtZero, RefusedWaveform, RigError
@@ -290,6 +291,7 @@ class _Run:
         self._unknown_since: float | None = None
         self._progress = progress
         self._clock = clock
+        self._clock_watch = ClockWatch()
         self._unread = 0.0  # s of samples that wait for this program
         self._events: list[str] = []
         self._trip: Trip | None = None  # the first one; later ones follow from it
@@ -415,6 +417,8 @@ class _Run:
     def _watch(self, block: Block) -> Trip | None:
         """Return the interlock that trips now, if any; every one is recorded as an event."""
         self._tell_notices()
+        if change := self._clock_watch.change():
+            self._note(self._recorder.received, "warning", change)
         free = self._recorder.free_bytes()
         # every conversion is checked, not the mean of a row
         trips = [self._in_rows(trip) for trip in self._interlocks.watch(block)]

@@ -98,17 +98,18 @@ def play_campaign(
     notify: Notify | None = None,
     progress: Progress = quiet,
     now: Callable[[], float] = time.time,
+    clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], None] = time.sleep,
 ) -> CampaignOutcome:
     """Play the runs of ``campaign`` on the rig at ``address``; recordings go to ``folder``.
 
     With ``resume`` the campaign in ``folder`` is continued. A rig that is not simulated needs an
     ``arming`` with a number of runs, hours and a name, or what is left of an earlier one. ``now``
-    is Unix time in s, ``wait`` waits for so many s. A simulated rig that is not paced has no rests.
-    ``ended`` is called with the outcome before an error is raised, ``noted`` with the entries that
-    are in the journal, and then with each new one. ``interrupts`` lets another thread end the run
-    and the campaign; by default ctrl-C does. ``computing`` stands in for ``compute`` after each
-    run. ``notify`` are the settings of notifications, by default those of the plan.
+    and ``clock`` are Unix time and the time that has passed in s, ``wait`` waits for so many s. A
+    simulated rig that is not paced has no rests. ``ended`` is called with the outcome before an
+    error is raised, ``noted`` with the entries that are in the journal, then with each new one.
+    ``interrupts`` lets another thread end the run and the campaign; by default ctrl-C does.
+    ``computing`` stands in for ``compute`` after each run, ``notify`` for the plan's settings.
 
     Raises ``InputError`` before anything is played, and for a run that the gate refuses at its
     turn; ``SafetyStop``, ``InstrumentFault`` or ``NotSafe`` where a run ended so that a person must
@@ -140,10 +141,10 @@ def play_campaign(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder} cannot be created: {error.strerror or error}") from error
-    with Journal(folder, now) as journal:
+    with Journal(folder, now, clock) as journal:
         session = _Session(
             campaign, address, rig_file, folder, options, journal, observer, noted, interrupts,
-            computing or compute, notifier, progress, now, wait,
+            computing or compute, notifier, progress, clock, wait,
         )  # fmt: skip
         session.begin(forecast, arming)
         stop: DearigError | None
@@ -227,12 +228,12 @@ class _Session:
         computing: Compute,
         notifier: Notifier,
         progress: Progress,
-        now: Callable[[], float],
+        clock: Callable[[], float],
         wait: Callable[[float], None],
     ) -> None:
         self._campaign, self._address, self._rig_file = campaign, address, rig_file
         self._folder, self._options, self._journal = folder, options, journal
-        self._observer, self._progress, self._now, self._wait = observer, progress, now, wait
+        self._observer, self._progress, self._clock, self._wait = observer, progress, clock, wait
         self._noted, self._interrupts, self._computing = noted, interrupts, computing
         self._notifier = notifier
         self._output: OutputState | None = None  # after the last run
@@ -303,7 +304,7 @@ class _Session:
             hours = arming.hours
             self.note(
                 "armed", by=arming.by, rig=self._address, runs=arming.runs,
-                until=None if hours is None else self._now() + 3600.0 * hours,
+                until=None if hours is None else self._journal.arm(3600.0 * hours),
             )  # fmt: skip
         elif queue.status:
             # what is left of the earlier arming
@@ -389,7 +390,7 @@ class _Session:
             if queue.armed_runs is not None and queue.armed_runs <= 0:
                 return "armed_runs", self._left("the armed number of runs was played"), None
             until = queue.armed_until
-            if until is not None and self._now() + run.duration > until:
+            if until is not None and self._journal.time() + run.duration > until:
                 return "armed_time", self._left("the armed time does not last for a run"), None
             if queue.paused:
                 self._progress("paused", self._part())
@@ -418,8 +419,8 @@ class _Session:
         self._rested = True
         if self._simulated and not self._options.paced:
             return
-        end = self._now() + self._campaign.rest
-        while (left := end - self._now()) > 0.0 and not self.queue.ending:
+        end = self._clock() + self._campaign.rest
+        while (left := end - self._clock()) > 0.0 and not self.queue.ending:
             self._progress("resting", self._part())
             self._wait(min(left, _POLL))
             self._check_interrupts()

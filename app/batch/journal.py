@@ -12,10 +12,12 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from dearig.clock import UnixTime
 from dearig.errors import InputError
 from dearig.input_file import parse_json, read_input
 from dearig.recording.content.layout import iso_time
@@ -68,15 +70,33 @@ def _finite(text: str) -> float:
     return value
 
 
+def _last_of_arming(entries: Iterable[Mapping[str, Any]]) -> float:
+    """Return the latest time in s since 1970 of ``entries`` since the last arming; 0 without."""
+    last, until = 0.0, None
+    for entry in entries:
+        if entry["event"] == "armed" and entry.get("until") != until:
+            last, until = 0.0, entry.get("until")
+        with contextlib.suppress(ValueError, OverflowError, OSError):
+            last = max(last, datetime.fromisoformat(str(entry.get("at"))).timestamp())
+    return last
+
+
 class Journal:
     """The journal of a campaign, locked and open to be appended to; a context manager.
 
-    ``now`` gives Unix time in s. Raises ``InputError`` for a journal that another process holds.
+    ``now`` gives Unix time in s, ``clock`` the s that have passed. ``time`` is that by which the
+    armed time is judged: it does not go back where the computer's clock is set back, also between
+    two sessions. Raises ``InputError`` for a journal that another process holds.
     """
 
-    def __init__(self, folder: Path, now: Callable[[], float] = time.time) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        now: Callable[[], float] = time.time,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.path = folder / JOURNAL
-        self._now = now
+        self._now, self._clock = now, clock
         try:
             os.close(os.open(self.path, os.O_WRONLY | os.O_CREAT, 0o666))
             self._lock = lock_existing(self.path)
@@ -89,11 +109,17 @@ class Journal:
             ) from error
         try:
             self.entries = read_lines(self.path)
+            self.time = UnixTime(now, clock, _last_of_arming(self.entries))
             self._drop_torn_line()
             _sync_folder(folder)
         except BaseException:
             self._lock.release()
             raise
+
+    def arm(self, seconds: float) -> float:
+        """Return the Unix time in s at which an arming for so many ``seconds`` from now ends."""
+        self.time = UnixTime(self._now, self._clock)
+        return self.time() + seconds
 
     def append(self, event: str, **facts: Any) -> dict[str, Any]:
         """Append an entry, which is on the disk when this returns, and return it.

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dearig.acquisition.interrupts import Interrupts
+from dearig.acquisition.run import RunResult
 from dearig.batch import campaign as module
 from dearig.batch.after import AfterRun
 from dearig.batch.ask import ask
@@ -300,6 +301,44 @@ def test_a_real_rig_is_armed_by_a_person_for_runs_and_hours(bench: Bench) -> Non
     assert bench.continued(arming=Arming()).status == "armed_runs"  # nothing is left of it
     assert bench.continued(arming=Arming("Ada", 9, 0.0001)).status == "armed_time"
     assert bench.continued(arming=Arming("Ada", 1, 1.0)).status == "complete"
+
+
+@pytest.mark.parametrize("kill_at", [-1, 2 * 5])  # within a session, or before the next one
+def test_a_clock_that_is_set_back_does_not_make_the_armed_time_longer(
+    bench: Bench, kill_at: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def half_an_hour(*given: object, **more: object) -> RunResult:
+        bench.pass_time(1800.0)
+        bench.at -= 86_400.0 if kill_at < 0 else 0.0
+        return bench.record(*given, **more)
+
+    monkeypatch.setattr(module, "record", half_an_hour)
+    bench.simulated, bench.kill_at = False, kill_at
+    arming = Arming("Ada", 9, 0.51)
+    if kill_at < 0:
+        assert bench.play(arming=arming).status == "armed_time"
+    else:
+        with pytest.raises(Killed):
+            bench.play(arming=arming)
+        bench.kill_at, bench.at = -1, bench.at - 86_400.0
+        assert bench.continued(arming=Arming()).status == "armed_time"
+    assert states(bench) == ["done", "done", "waiting"]
+    # a new arming is by the clock as it is
+    assert bench.continued(arming=Arming("Ada", 9, 0.51)).status == "complete"
+
+
+@pytest.mark.parametrize("step", [-3600.0, 3600.0])
+def test_a_rest_is_by_the_time_that_has_passed(bench: Bench, step: float) -> None:
+    rested = []
+
+    def wait(seconds: float) -> None:
+        bench.pass_time(seconds)
+        bench.at += step
+        rested.append(seconds)
+
+    plan = PLAN + "rest_s = 5.0\n"
+    assert bench.play(plan, wait=wait, paced=True).status == "complete"
+    assert sum(rested) == pytest.approx(2 * 5.0)
 
 
 def test_what_is_left_of_an_arming_survives_a_kill(bench: Bench) -> None:

@@ -54,6 +54,7 @@ class Bench:
     appended: int = 0
     simulated: bool = True
     at: float = 1_800_000_000.0
+    passed: float = 0.0
 
     def record(self, *given, **_) -> RunResult:
         """Evaluation in for the run: count it, and leave the recording that its fate asks for."""
@@ -84,11 +85,13 @@ class Bench:
         return play_campaign(
             self.campaign(plan), "sim", RIG_FILE, self.folder / "out",
             RunOptions(paced=paced), arming or Arming(), resume=resume, now=lambda: self.at,
+            clock=lambda: self.passed,
             wait=wait or self.pass_time, **more,
         )  # fmt: skip
 
     def pass_time(self, seconds: float) -> None:
         self.at += seconds
+        self.passed += seconds
 
     def campaign(self, plan: str = PLAN) -> Campaign:
         return parse_campaign(plan, "plan", self.folder)

@@ -150,7 +150,7 @@ class CampaignControls(QWidget):
         steps = QHBoxLayout()
         steps.addWidget(self.paced)
         steps.addStretch(1)
-        self.arm = StepButton("1  Arm", "First step: no voltage yet", "F5", self, self._status)
+        self.arm = StepButton("1  Arm", "First step: no output yet", "F5", self, self._status)
         self.arm.setCheckable(True)
         self.start = StepButton("2  Start", "Second step: play the batch", "F6", self, self._status)
         for step in (self.arm, self.start):

@@ -17,6 +17,7 @@ from pathlib import Path
 from PySide6.QtCore import QLockFile, QObject, Qt, QTimer, Signal, Slot
 
 from dearig.acquisition.rigs import is_simulated
+from dearig.clock import ClockWatch
 from dearig.output_state import Known, OutputState
 from dearig.window.high_voltage.state import HighVoltage, kilovolts, state_at_rest
 from dearig.window.session.recovery import lock_of, unsaved_folder
@@ -39,6 +40,7 @@ log = logging.getLogger(__name__)
 #: s without a sample, beside the time of one, after which the last one is not that of now.
 SILENT = 1.0
 ARMED_FOR = 30.0  #: s after which a rig that was armed and not started is disarmed
+_CLOCK = 1.0  # s between two looks at the computer's clock
 _TICK = 250  # ms between two updates of the countdown
 _KEY = "alarm"  # of the settings; with the address of the rig
 _BLOCK = "alarm"  # of the session
@@ -125,6 +127,10 @@ class HighVoltageStatus(QObject):
         self._opening.timeout.connect(self._open_start)
         self._ticks = QTimer(self, interval=_TICK)
         self._ticks.timeout.connect(self._tick)
+        self._clock_watch = ClockWatch()
+        self._clock_looks = QTimer(self, interval=round(1000 * _CLOCK))
+        self._clock_looks.timeout.connect(self._look_at_clock)
+        self._clock_looks.start()
         self.reading: OutputReading | None = None
         self._read_at = 0.0  # when ``reading`` came
         self._silence = 0  # whole s without a sample, 0 while they come
@@ -185,12 +191,14 @@ class HighVoltageStatus(QObject):
         """Sentence on the state: the countdown, or what was measured and when."""
         words = ""
         if self._state is HighVoltage.ARMED:
-            words = f"no voltage yet; disarms in {self.seconds_to_start} s"
+            words = f"not started yet; disarms in {self.seconds_to_start} s"
         elif self.live:
             words = self.silence
         else:
             output = self.output
             words = "the voltage was not read yet" if output is None else output.sentence
+            if output is not None and output.at > time.time() + _CLOCK:
+                words = f"{words}; the computer's clock was set back since then"
             if self._state is HighVoltage.BETWEEN:
                 words = f"{words}; {self._next}"
         simulated = is_simulated(self._session.address)
@@ -208,7 +216,7 @@ class HighVoltageStatus(QObject):
     def brief(self) -> str:
         """What fits below the state: the voltage and its moment, or the time to start."""
         if self._state is HighVoltage.ARMED:
-            return f"no voltage yet; disarms in {self.seconds_to_start} s"
+            return f"not started yet; disarms in {self.seconds_to_start} s"
         volts, belongs_to = self.number
         if math.isnan(volts):
             return self.words
@@ -378,6 +386,14 @@ class HighVoltageStatus(QObject):
         if _now() >= self._deadline:
             self.disarm_due.emit()
         else:
+            self.changed.emit()
+
+    @Slot()
+    def _look_at_clock(self) -> None:
+        """Say that the computer's clock was set: the bar shows times of day."""
+        if change := self._clock_watch.change():
+            log.warning("%s", change)
+            self._session.message.emit(f"{change[0].upper()}{change[1:]}")
             self.changed.emit()
 
     @Slot()

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
+import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Slot
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -18,7 +19,7 @@ from dearig.window.kit.turns import Turns
 from dearig.window.kit.widgets import plain_tip
 from dearig.window.plots.area import PlotArea
 from dearig.window.plots.limit_lines import MarkLine, PlotOverlay
-from dearig.window.plots.plot import LegendEntry
+from dearig.window.plots.plot import LegendEntry, Plot
 from dearig.window.run.channel_plots import ChannelPlots
 from dearig.window.session.state import Session
 
@@ -68,8 +69,7 @@ class CurvesPlot(QWidget):
         """Draw ``curves``, all of one kind, over their whole time."""
         self._shown = tuple(curves)
         self.area.file_stem = self._shown[0].name if len(self._shown) == 1 else "recordings"
-        self._draw()
-        self._turns.add((self.area.auto_range,))
+        self._draw(whole=True)
 
     @Slot(bool)
     def show_model(self, shown: bool) -> None:
@@ -84,9 +84,10 @@ class CurvesPlot(QWidget):
         self._draw()
 
     @Slot()
-    def _draw(self) -> None:
+    def _draw(self, whole: bool = False) -> None:
         theme = self._session.theme
         self._turns.clear()
+        self.area.setUpdatesEnabled(False)  # one drawing, and not one after each curve
         self.marks.set_theme(theme)
         self.marks.show_marks((), with_words=True)
         for plot in self.plots:
@@ -102,50 +103,54 @@ class CurvesPlot(QWidget):
         self.channels.show_channels([(name, unit) for name, unit, _ in declared])
         for place, (_, _, values) in enumerate(declared):
             self.channels.show_values(place, *values)
-        if not self._shown:
-            return
-        zero = pg.InfiniteLine(0.0, angle=0, pen=pen(theme.muted, dashed=True))
-        residual.addItem(zero, ignoreBounds=True)
-        self._turns.add(partial(self._draw_one, i, c) for i, c in enumerate(self._shown))
+        if self._shown:
+            zero = pg.InfiniteLine(0.0, angle=0, pen=pen(theme.muted, dashed=True))
+            residual.addItem(zero, ignoreBounds=True)
+        for place, curves in enumerate(self._shown):
+            self._turns.add(self._pieces(place, curves))
+        if whole:
+            self._turns.add((self.area.auto_range,))
+        self._turns.add((partial(self.area.setUpdatesEnabled, True),))
 
-    def _draw_one(self, place: int, curves: Curves) -> None:
-        """Draw ``curves``, which are shown at ``place``."""
+    def _pieces(self, place: int, curves: Curves) -> Iterator[Callable[[], None]]:
+        """Yield what draws ``curves``, which are shown at ``place``, a curve each."""
         theme, alone, last = self._session.theme, len(self._shown) == 1, len(self._shown) - 1
         drive, both, residual, current = self.plots
         shown = SHOWN[curves.kind]
         colour = theme.measured if alone else theme.curves[place % len(theme.curves)]
         name = "measured" if alone else curves.name
         # several recordings are named once: their keys would take the height of the plots
-        drive.add_curve(
-            "commanded" if alone else name, theme.command if alone else colour, in_key=alone
-        ).set_points(curves.drive[0], curves.drive[1] * shown.drive_factor)
+        own = partial(_draw_curve, in_key=alone)
+        yield partial(
+            own, drive, "commanded" if alone else name, theme.command if alone else colour,
+            curves.drive, shown.drive_factor,
+        )  # fmt: skip
         if curves.current is not None:
-            time, amperes = curves.current
-            current.add_curve(
-                "monitored current" if alone else name,
-                theme.monitor if alone else colour,
-                in_key=alone,
-            ).set_points(time, amperes * 1e3)
-        time, measured = curves.measured
-        both.add_curve(name, colour).set_points(time, measured * shown.factor)
+            yield partial(
+                own, current, "monitored current" if alone else name,
+                theme.monitor if alone else colour, curves.current, 1e3,
+            )  # fmt: skip
+        yield partial(_draw_curve, both, name, colour, curves.measured, shown.factor)
         if self._with_model and curves.model is not None and curves.residual is not None:
             beside = theme.models[0] if alone else colour
-            time, model = curves.model
-            both.add_curve(
-                "model" if alone else f"model of {name}", beside, dashed=not alone, in_key=alone
-            ).set_points(time, model * shown.factor)
-            time, left = curves.residual
-            residual.add_curve("residual" if alone else name, beside, in_key=alone).set_points(
-                time, left * shown.error_factor
-            )
+            yield partial(
+                own, both, "model" if alone else f"model of {name}", beside, curves.model,
+                shown.factor, dashed=not alone,
+            )  # fmt: skip
+            yield partial(
+                own, residual, "residual" if alone else name, beside, curves.residual,
+                shown.error_factor,
+            )  # fmt: skip
         if alone:
             if curves.monitor is not None:
-                drive.add_curve("monitor", theme.monitor).set_points(
-                    curves.monitor[0], curves.monitor[1] * shown.drive_factor
-                )
-            self._events(curves)
+                yield partial(
+                    _draw_curve, drive, "monitor", theme.monitor, curves.monitor,
+                    shown.drive_factor,
+                )  # fmt: skip
+            yield partial(self._events, curves)
         elif place == last and self._with_model and any(c.model is not None for c in self._shown):
-            both.add_entry(LegendEntry("model of each recording", theme.muted, dashed=True))
+            entry = LegendEntry("model of each recording", theme.muted, dashed=True)
+            yield partial(both.add_entry, entry)
 
     def _events(self, curves: Curves) -> None:
         theme = self._session.theme
@@ -161,6 +166,20 @@ class CurvesPlot(QWidget):
             line.setToolTip(plain_tip(f"{event.time:.4g} s, {event.level}: {event.message}"))
             line.setCursor(Qt.CursorShape.WhatsThisCursor)
             self.plots[1].addItem(line, ignoreBounds=True)
+
+
+def _draw_curve(
+    plot: Plot,
+    name: str,
+    colour: str,
+    points: tuple[np.ndarray, np.ndarray],
+    factor: float,
+    *,
+    dashed: bool = False,
+    in_key: bool = True,
+) -> None:
+    time, values = points
+    plot.add_curve(name, colour, dashed=dashed, in_key=in_key).set_points(time, values * factor)
 
 
 def rms_text(curves: Curves) -> str:

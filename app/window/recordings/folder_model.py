@@ -37,15 +37,18 @@ _Index = QModelIndex | QPersistentModelIndex
 
 SUMMARY = int(Qt.ItemDataRole.UserRole)
 PATH = SUMMARY + 1
-#: Roles that cells have; a view asks for twice as many in each of its drawings.
-_ROLES = (
-    Qt.ItemDataRole.DisplayRole,
-    Qt.ItemDataRole.ToolTipRole,
-    Qt.ItemDataRole.TextAlignmentRole,
-    Qt.ItemDataRole.ForegroundRole,
-    SUMMARY,
-    PATH,
+_DISPLAY, _TIP, _ALIGNMENT, _FOREGROUND = (
+    int(role)
+    for role in (
+        Qt.ItemDataRole.DisplayRole,
+        Qt.ItemDataRole.ToolTipRole,
+        Qt.ItemDataRole.TextAlignmentRole,
+        Qt.ItemDataRole.ForegroundRole,
+    )
 )
+#: Roles that cells have; a view asks for twice as many in each of its drawings.
+_ROLES = frozenset((_DISPLAY, _TIP, _ALIGNMENT, _FOREGROUND, SUMMARY, PATH))
+_RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 _ROOT = QModelIndex()
 #: Wait before rows are sorted again after summaries have come: rows must not jump at every one.
 _SETTLE_MS = 300
@@ -183,6 +186,7 @@ class FolderModel(QAbstractTableModel):
         self._rows: list[Path] = []
         self._row: dict[Path, int] = {}
         self._words: tuple[str, ...] = ()
+        self._cells: dict[Path, tuple[str, ...]] = {}  # texts of a file; a drawing asks for them
         self._texts: dict[Path, str] = {}
         self._column, self._order = _START, Qt.SortOrder.DescendingOrder
         self._settle = QTimer(self, singleShot=True, interval=_SETTLE_MS)
@@ -209,6 +213,7 @@ class FolderModel(QAbstractTableModel):
     ) -> None:
         """Show ``files`` (path to time of change and size), with the ``summaries`` known so far."""
         self._files, self._summaries = dict(files), dict(summaries)
+        self._cells.clear()
         self._texts.clear()
         self._arrange()
         self._redraw()
@@ -218,6 +223,7 @@ class FolderModel(QAbstractTableModel):
         if summary.path not in self._files:
             return
         self._summaries[summary.path] = summary
+        self._cells.pop(summary.path, None)
         self._texts.pop(summary.path, None)
         self._searched(summary.path)  # now, so that the first search does not make all of them
         row = self._row.get(summary.path)
@@ -268,23 +274,35 @@ class FolderModel(QAbstractTableModel):
     def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         if role not in _ROLES or not index.isValid():
             return None
+        column = index.column()
+        if role == _ALIGNMENT:
+            return _RIGHT if COLUMNS[column].number else None
+        if role == _FOREGROUND and column != ENDED:
+            return None
         path = self._rows[index.row()]
-        summary, column = self._summaries.get(path), index.column()
-        if role == Qt.ItemDataRole.DisplayRole:
-            return self._text(path, summary, column)
+        if role == _DISPLAY:
+            return self._texts_of(path)[column]
         if role == PATH:
             return path
+        summary = self._summaries.get(path)
         if role == SUMMARY:
             return summary
-        if role == Qt.ItemDataRole.ToolTipRole:
+        if role == _TIP:
             return plain_tip(_tip(path, summary, column))
-        if role == Qt.ItemDataRole.TextAlignmentRole and COLUMNS[column].number:
-            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        if role == Qt.ItemDataRole.ForegroundRole and column == ENDED and summary is not None:
+        if summary is not None:
             theme, level = self._session.theme, how_it_ended(summary)[0]
             colour = {"fault": theme.bad, "warning": theme.warn}.get(level)
             return None if colour is None else QColor(colour)
         return None
+
+    def _texts_of(self, path: Path) -> tuple[str, ...]:
+        """Return the texts of a file's cells."""
+        cells = self._cells.get(path)
+        if cells is None:
+            summary = self._summaries.get(path)
+            cells = tuple(self._text(path, summary, column) for column in range(len(COLUMNS)))
+            self._cells[path] = cells
+        return cells
 
     def _text(self, path: Path, summary: RecordingSummary | None, column: int) -> str:
         if summary is None:
@@ -296,9 +314,7 @@ class FolderModel(QAbstractTableModel):
     def _searched(self, path: Path) -> str:
         """Return the text of a file that a search looks through."""
         if path not in self._texts:
-            summary = self._summaries.get(path)
-            cells = [self._text(path, summary, column) for column in range(len(COLUMNS))]
-            self._texts[path] = "\n".join(cells).casefold()
+            self._texts[path] = "\n".join(self._texts_of(path)).casefold()
         return self._texts[path]
 
     def _key(self, path: Path) -> Any:
@@ -380,6 +396,8 @@ class ThumbnailDelegate(QStyledItemDelegate):
     def __init__(self, session: Session) -> None:
         super().__init__(session)
         self._session = session
+        # lines in a unit square, with what they were made of
+        self._lines: dict[Path, tuple[RecordingSummary, QPolygonF]] = {}
 
     def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:  # noqa: ARG002, N802
         return QSize(84, 30)
@@ -390,17 +408,26 @@ class ThumbnailDelegate(QStyledItemDelegate):
         area = QRectF(option.rect).adjusted(4, 4, -4, -4)
         if not isinstance(summary, RecordingSummary) or summary.thumbnail[0].size < 2:
             return
-        x, y = summary.thumbnail
-        across = area.left() + x * area.width()
-        up = area.bottom() - y * area.height()
-        line = QPolygonF([QPointF(float(a), float(b)) for a, b in zip(across, up, strict=True)])
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         theme, selected = self._session.theme, QStyle.StateFlag.State_Selected
         colour = theme.on_accent if option.state & selected else theme.accent
-        painter.setPen(QPen(QColor(colour), 1.0))
-        painter.drawPolyline(line)
+        pen = QPen(QColor(colour), 1.0)
+        pen.setCosmetic(True)
+        painter.setPen(pen)
+        painter.translate(area.bottomLeft())
+        painter.scale(area.width(), -area.height())
+        painter.drawPolyline(self._line(summary))
         painter.restore()
+
+    def _line(self, summary: RecordingSummary) -> QPolygonF:
+        of, line = self._lines.get(summary.path, (None, QPolygonF()))
+        if of is not summary:
+            x, y = summary.thumbnail
+            points = zip(x.tolist(), y.tolist(), strict=True)
+            line = QPolygonF([QPointF(a, b) for a, b in points])
+            self._lines[summary.path] = summary, line
+        return line
 
 
 def shown_columns(names: Iterable[str]) -> list[bool]:

@@ -35,6 +35,7 @@ from dearig.window.jobs.worker import Job
 from dearig.window.kit.flow import Flow
 from dearig.window.kit.report_table import ReportTable, two_columns
 from dearig.window.kit.theme import SPACE
+from dearig.window.kit.turns import Turns
 from dearig.window.kit.widgets import ElidedLabel, Message, button, menu_button, plain_tip
 from dearig.window.recordings.conditions_table import ConditionsTable
 from dearig.window.recordings.curves_plot import CurvesPlot, rms_text
@@ -69,6 +70,7 @@ class RecordingsPage(Page):
         self._reading: list[Job] = []
         self._read: dict[Path, Curves] = {}
         self._wanted: list[Path] = []
+        self._turns = Turns(lambda: session.busy, self)
         self._round = 0
         self._differing: Job | None = None
         self._to_choose: list[Path] = []  # files to choose as soon as they are listed
@@ -140,11 +142,11 @@ class RecordingsPage(Page):
         outer.addWidget(self.splitter, 1)
 
     def _connect(self) -> None:
-        self.table.chosen_changed.connect(self._selected)
+        self.table.chosen_changed.connect(lambda: self._choose.start())
         self.table.verticalScrollBar().valueChanged.connect(self._prefer_visible)
         self.filter.textChanged.connect(self._find)
         self.files.arranged.connect(self._rows_changed)
-        self.trend.picked.connect(self._pick)
+        self.trend.picked.connect(lambda path: self.choose([path]))
         self.imports.said.connect(self.message.show_text)
         self.imports.written.connect(self._imported)
         self.analysis.trouble.connect(self.message.show_text)
@@ -270,10 +272,6 @@ class RecordingsPage(Page):
             self.table.scrollTo(self.table.currentIndex())
 
     @Slot()
-    def _selected(self) -> None:
-        self._choose.start()
-
-    @Slot()
     def _show_chosen(self) -> None:
         chosen = self.chosen()
         self.tags.show_recordings(chosen)
@@ -301,7 +299,9 @@ class RecordingsPage(Page):
         self._analyse()
         if not readable:
             self.plot.show_curves(())
-            self._show_about()
+            self._turns.clear()
+            self._show_details()
+            self._show_events()
         for path in readable:
             of = self._round
             job = self._library.submit(
@@ -370,13 +370,14 @@ class RecordingsPage(Page):
                 "warn",
             )
         self.plot.show_curves(ready)
-        self._show_about()
+        self._turns.clear()
+        self._turns.add((self._show_details, self._show_events))
         unfit = next((c.unfit for c in ready if c.unfit), "")
         if unfit:
             self.message.show_text(f"No model is plotted: {unfit}", "warn")
         self.sequence_button.setEnabled(len(ready) == 1 and bool(ready[0].sequence_toml))
 
-    def _show_about(self) -> None:
+    def _show_details(self) -> None:
         shown = self.plot.shown
         if len(shown) == 1:
             self.details.show_table(two_columns("", shown[0].about))
@@ -384,6 +385,9 @@ class RecordingsPage(Page):
             names = tuple((c.name, rms_text(c)) for c in shown)
             words = (("", "Select a recording above; several with Ctrl or Shift"),)
             self.details.show_table(two_columns("", names or words))
+
+    def _show_events(self) -> None:
+        shown = self.plot.shown
         rows = tuple(
             Row((f"{e.time:.4g}", c.name, e.level, e.message), mark=e.level != "info")
             for c in shown
@@ -587,10 +591,6 @@ class RecordingsPage(Page):
     def _show_trend(self) -> None:
         if self.views.currentWidget() is self.trend:
             self.trend.show_summaries(self.files.shown, self.chosen())
-
-    @Slot(Path)
-    def _pick(self, path: Path) -> None:
-        self.choose([path])
 
 
 def _files(event: QDropEvent) -> list[Path]:

@@ -280,7 +280,8 @@ class RigPage(Page):
         )
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
-        if any(url.toLocalFile().endswith(".toml") for url in event.mimeData().urls()):
+        urls = event.mimeData().urls()
+        if not self.session.running and any(u.toLocalFile().endswith(".toml") for u in urls):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802

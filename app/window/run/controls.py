@@ -99,7 +99,7 @@ class RunControls(QWidget):
         self._status = status
         self._numbers_of = status.run_number  # that the readouts belong to
         self.badge = HighVoltageBadge(large=True)
-        self.arm_button = StepButton("1  Arm", "First step: no voltage yet", "F5", self, status)
+        self.arm_button = StepButton("1  Arm", "First step: no output yet", "F5", self, status)
         self.arm_button.setCheckable(True)
         self.start_button = StepButton(
             "2  Start", "Second step: play and record the sequence", "F6", self, status

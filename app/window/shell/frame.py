@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar, cast
 
-from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Slot
+from PySide6.QtCore import QEvent, QPoint, QRect, QSize, Qt, QTimer, Slot
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
@@ -16,6 +16,7 @@ from PySide6.QtGui import (
     QKeySequence,
     QMoveEvent,
     QResizeEvent,
+    QScreen,
     QShowEvent,
 )
 from PySide6.QtWidgets import (
@@ -41,9 +42,9 @@ from dearig.window.documents.dialogs import run_dialog
 from dearig.window.documents.questions import may_close, offer_unsaved
 from dearig.window.high_voltage.bar import HighVoltageBar
 from dearig.window.high_voltage.stop_keys import StopKeys
+from dearig.window.kit.field_guard import FieldGuard
 from dearig.window.kit.theme import DARK, LIGHT, SPACE, apply, system_theme
 from dearig.window.kit.turns import Turns
-from dearig.window.kit.wheel_guard import WheelGuard
 from dearig.window.kit.widgets import ElidedLabel
 from dearig.window.recordings.library import shared_library
 from dearig.window.recordings.page import RecordingsPage
@@ -78,7 +79,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.session = session
         self.setWindowTitle("dearig[*]")  # Qt shows a mark there while something is not saved
-        self.wheel_guard = WheelGuard(self)
+        self.field_guard = FieldGuard(self)
         self.planner = Planner(session, self)
         self.compilation = Compilation(self)
         self.library = shared_library(session)  # lists the folder while the window is made
@@ -95,6 +96,9 @@ class MainWindow(QMainWindow):
         self._build()
         self._guide: Guide | None = None
         self._closing = self._settling = False
+        # after the last of several moves, such as those of a drag
+        self._moved = QTimer(self, singleShot=True, interval=_SETTLING)
+        self._moved.timeout.connect(self._keep_stop_in_reach)
         self._by_signal = False  # closed by a signal: nobody is there to be asked
         self._connect()
         self.idle_pages = IdlePages(session, self._make_next_page, self)
@@ -207,6 +211,38 @@ class MainWindow(QMainWindow):
         super().moveEvent(event)
         if self._settling:
             QTimer.singleShot(0, self._fit_screen)
+        self._place_changed()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Come back at once while STOP must be within reach: an icon has none, and no keys."""
+        super().changeEvent(event)
+        minimised = event.type() == QEvent.Type.WindowStateChange and self.isMinimized()
+        if minimised and self.session.busy:
+            QTimer.singleShot(0, self._come_back)
+
+    @Slot()
+    def _come_back(self) -> None:
+        self.setWindowState(self.windowState() & ~Qt.WindowState.WindowMinimized)
+        self.activateWindow()
+        self.session.message.emit("The window stays open while STOP may be needed")
+
+    @Slot()
+    def _keep_stop_in_reach(self) -> None:
+        """Move the window into the screen where STOP is not on one while it may be needed."""
+        stop = self.bar.stop_button
+        place = QRect(stop.mapToGlobal(QPoint(0, 0)), stop.size())
+        screens = QGuiApplication.screens()
+        seen = any(screen.availableGeometry().contains(place) for screen in screens)
+        if self.session.busy and not seen:
+            self._fit_screen()
+
+    @Slot(QScreen)
+    def _watch_screen(self, screen: QScreen) -> None:
+        screen.availableGeometryChanged.connect(self._place_changed)
+
+    @Slot()
+    def _place_changed(self) -> None:
+        self._moved.start()
 
     @Slot()
     def _settled(self) -> None:
@@ -380,6 +416,12 @@ class MainWindow(QMainWindow):
         self.planner.progressed.connect(self.sequence_page.preview.show_progress)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
         session.running_changed.connect(self._apply_colour_scheme)
+        for screen in QGuiApplication.screens():
+            self._watch_screen(screen)
+        application = cast(QGuiApplication, QGuiApplication.instance())
+        application.screenAdded.connect(self._watch_screen)
+        application.screenRemoved.connect(self._place_changed)
+        session.armed_changed.connect(self._place_changed)
         self.addActions(run.display.mark_bar.actions())  # the key M on every page
         session.blocks_changed.connect(lambda: self.banners.show_blocks(session.blocks))
         self.banners.show_blocks(session.blocks)

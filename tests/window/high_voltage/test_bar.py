@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 
 import pytest
@@ -144,6 +145,13 @@ def test_an_interlock_latches_until_somebody_acknowledges_it(
     recording = open_recording(path)
     assert recording.events[-1].message.startswith("Grace acknowledged: Stopped by an interlock")
     assert verify(path).sound
+
+
+def test_a_time_of_day_that_is_to_come_says_that_the_clock_was_set_back(session: Session) -> None:
+    status = HighVoltageStatus(session)
+    for later, said in ((0.0, False), (3600.0, True)):
+        status.set_output(OutputState(Known.UNKNOWN, time.time() + later))
+        assert ("clock was set back" in status.words) is said
 
 
 def test_an_end_without_a_reading_latches_too(qtbot: QtBot, session: Session) -> None:

@@ -263,3 +263,15 @@ def test_the_first_start_fits_every_screen(session: Session, qtbot: QtBot) -> No
     assert window.height() < screen.height()  # its frame has a place
     assert screen.contains(QRect(QPoint(0, 0), window.size()))
     window.leave()
+
+
+def test_a_window_that_is_minimised_comes_back_while_stop_may_be_needed(
+    qtbot: QtBot, window: MainWindow
+) -> None:
+    window.session.set_armed(True)
+    window.showMinimized()
+    qtbot.waitUntil(lambda: not window.isMinimized())
+    window.session.set_armed(False)
+    window.showMinimized()
+    qtbot.wait(50)  # longer than it takes to come back
+    assert window.isMinimized()

@@ -1,16 +1,18 @@
-"""The wheel changes no field that does not have the focus, on any page and in any dialog."""
+"""Neither the wheel nor what is dropped changes a field that does not have the focus."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QCoreApplication, QMimeData, QPoint, QPointF, Qt
+from PySide6.QtGui import QDragEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractSlider,
     QAbstractSpinBox,
     QComboBox,
+    QLineEdit,
     QScrollArea,
     QScrollBar,
     QSpinBox,
@@ -150,3 +152,19 @@ def test_a_field_around_a_field_is_kept_out_too(qtbot: QtBot, window: MainWindow
     for notch in (DOWN, -DOWN):
         turn(inner, notch)
     assert (inner.value(), outer.currentIndex()) == (0, 0)
+
+
+def test_nothing_is_dropped_on_a_field(window: MainWindow) -> None:
+    dropped = QMimeData()
+    dropped.setText("9")
+    for page in window.pages:
+        window.show_page(page)
+    fields = window.findChildren(QLineEdit)
+    assert any(field.acceptDrops() for field in fields)
+    where, left = QPoint(9, 9), Qt.MouseButton.LeftButton
+    none = Qt.KeyboardModifier.NoModifier
+    enters = QDragEnterEvent(where, Qt.DropAction.CopyAction, dropped, left, none)
+    QCoreApplication.sendEvent(window.windowHandle(), enters)
+    assert len(fields) > 20
+    assert not any(field.acceptDrops() for field in fields)
+    assert window.page(RigPage).acceptDrops()  # what is dropped beside a field or on it is its

@@ -1,4 +1,4 @@
-"""Keeps the wheel from fields that do not have the focus."""
+"""Keeps the wheel from fields that do not have the focus, and what is dropped from all."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
     QComboBox,
+    QLineEdit,
     QScrollBar,
     QTabBar,
     QWidget,
@@ -19,20 +20,27 @@ from PySide6.QtWidgets import (
 
 from dearig.window.kit.window_filter import WindowFilter, widget_of
 
-__all__ = ["WheelGuard"]
+__all__ = ["FieldGuard"]
 
 _FIELDS = (QAbstractSpinBox, QComboBox, QAbstractSlider, QTabBar)
 
 
-class WheelGuard(WindowFilter):
+class FieldGuard(WindowFilter):
     """Keeps the wheel from every field of the program that does not have the focus.
 
     Fields are spin boxes, lists, sliders and tab bars. What surrounds the field scrolls instead.
     Qt turns the field under the pointer, and gives it the focus: limits and interlocks would be
     changed by a turn of the wheel.
+
+    A text or a file that is dropped on a field of one line is written into it, whether it has the
+    focus or not: a limit of 8.5 would be 98.5. The page around the field gets it instead.
     """
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
+        if event.type() == QEvent.Type.DragEnter and (over := widget_of(watched)) is not None:
+            for field in over.findChildren(QLineEdit):
+                field.setAcceptDrops(False)
+            return False
         if event.type() != QEvent.Type.Wheel or QApplication.activePopupWidget() is not None:
             return False  # a list that is open takes the wheel itself
         wheel = cast(QWheelEvent, event)
