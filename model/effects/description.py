@@ -204,9 +204,6 @@ class Effect:
     is_reproducible
         False for an event of one recording that is no property of the rig, as a jump of the
         sensor. No other recording is predicted with it.
-    is_viscoelastic
-        The effect relaxes as the network's branches do; its first two parameters are a modulus and
-        a relaxation time. While it is missing from a model, branches can imitate it.
     is_general
         The effect is the general law of its family: linear in its amplitudes, non-negative weights
         on a fixed grid of shapes, with a ``curve``.
@@ -238,7 +235,6 @@ class Effect:
     drives: tuple[str, ...] = field(default=("voltage",))
     is_hysteretic: bool = False
     is_reproducible: bool = True
-    is_viscoelastic: bool = False
     is_general: bool = False
     fitted_shapes: tuple[str, ...] = ()
     curve: Callable[[Mapping[str, float]], Curve] | None = None

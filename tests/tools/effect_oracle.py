@@ -255,11 +255,14 @@ def extra(name, p, film, drive):
         )
 
     def flowing():
-        r, time = p["reach"], p["time_constant"]
+        def slope(u, z):
+            over = max(abs(z) / p["reach"] - p["threshold"], 0.0) / (1.0 - p["threshold"])
+            return u - math.copysign(0.01 * over ** p["exponent"], z)
+
         return Extra(
             states=1,
-            stress=lambda t, lam, u, z, v: p["yield_stress"] * z[0] / r,
-            slopes=lambda t, lam, u, z, v: (u - (z[0] - limited(z[0], -r, r)) / time,),
+            stress=lambda t, lam, u, z, v: p["flow_stress"] * z[0] / p["reach"],
+            slopes=lambda t, lam, u, z, v: (slope(u, z[0]),),
         )
 
     def general_softening():

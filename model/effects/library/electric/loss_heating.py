@@ -8,16 +8,21 @@ units of the warming under a constant |V V'| of (5 kV)^2/s.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from dearig.model.compiled.jit import jit
-from dearig.model.effects.description import Effect, Law, Parameter
+from dearig.model.effects.description import Law
+from dearig.model.effects.library.electric.self_heating import EFFECT as BY_VOLTAGE
+from dearig.model.effects.library.electric.self_heating import soften
 from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "polarise", "soften"]
 
-EFFECT = Effect(
+_STIFFENING, _TIME = BY_VOLTAGE.parameters
+
+EFFECT = replace(
+    BY_VOLTAGE,
     name="loss heating",
-    family="thermal",
-    acts_on="environment",
     summary="the stiffness follows how fast the voltage changes, with a delay of seconds or more",
     law=Law(
         equations=(
@@ -29,23 +34,11 @@ EFFECT = Effect(
         where=((r"\theta", "warming over that under a constant |V dV/dt| of (5 kV)^2/s"),),
     ),
     parameters=(
-        Parameter(
-            "stiffening",
-            "",
-            (-0.5, 0.5),
-            "relative change of stress under a constant |V dV/dt| of (5 kV)^2/s, final",
-            3e-3,
-            0.0,
+        replace(
+            _STIFFENING,
+            meaning="relative change of stress under a constant |V dV/dt| of (5 kV)^2/s, final",
         ),
-        Parameter(
-            "time_constant",
-            "s",
-            (1.0, 3e3),
-            "of the warming",
-            20.0,
-            starts=(20.0, 5.0, 100.0),
-            logarithmic=True,
-        ),
+        _TIME,
     ),
     # the warming, and the square of the voltage at the end of the step before
     memory=2,
@@ -63,8 +56,3 @@ def polarise(c, k, m, j, start, end, h):
         power = abs(last - first) / _REFERENCE / h
         m[j], m[j + 1] = lagged(warm, power, power, h, c[k + 1]), last
     return 0.0, 0.0
-
-
-@jit
-def soften(c, k, m, j, lam, since, t, warmth):
-    return 1.0 + c[k] * m[j]

@@ -13,6 +13,10 @@ from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "polarise", "soften"]
 
+#: What warms the film, and by how much: of every effect of this warming.
+WARMING = r"\tau \dot{\theta} = \left(\frac{V}{5\,\mathrm{kV}}\right)^2 - \theta"
+WARMTH = ((r"\theta", "warming over that under constant 5 kV"),)
+
 EFFECT = Effect(
     name="self-heating",
     family="thermal",
@@ -21,11 +25,11 @@ EFFECT = Effect(
     law=Law(
         equations=(
             r"\sigma = (1 + a \theta) \sigma_0",
-            r"\tau \dot{\theta} = \left(\frac{V}{5\,\mathrm{kV}}\right)^2 - \theta",
+            WARMING,
         ),
         symbols=("a", r"\tau"),
         source="Newton's law of cooling",
-        where=((r"\theta", "warming over that under constant 5 kV"),),
+        where=WARMTH,
     ),
     parameters=(
         Parameter(

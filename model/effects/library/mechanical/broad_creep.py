@@ -54,7 +54,6 @@ EFFECT = Effect(
     ),
     memory=6,
     drives=("voltage", "stretch"),
-    is_viscoelastic=True,
 )
 
 _BRANCHES = 6

@@ -37,7 +37,6 @@ EFFECT = Effect(
     ),
     memory=1,
     drives=("voltage", "stretch"),
-    is_viscoelastic=True,
 )
 
 

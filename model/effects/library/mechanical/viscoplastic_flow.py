@@ -1,9 +1,10 @@
-"""Viscoplastic flow of the film: a stress that yields, flows with a time, and leaves a set.
+"""Viscoplastic flow of the film: a stress that flows, beyond a threshold or without one.
 
-A spring in series with a slider and a dashpot side by side (Bingham; Duvaut and Lions 1972), beside
-the network. The elastic stretch z obeys z' = lam' while |z| is below the threshold r, and
-z' = lam' - (z -+ r)/T beyond it; the stress is Y z/r. With a short time T it is an ideal yielding
-element, with a small threshold a Maxwell branch. Both parts are solved exactly over a step.
+A spring in series with a dashpot whose rate is a power of the stress (Norton; Bergstrom and
+Boyce), beyond a threshold (Perzyna), beside the network. The elastic stretch z obeys
+z' = lam' -+ u ((|z|/r - s)/(1 - s))^n with u = 0.01/s, and the stress is Y z/r: Y is what the
+element bears while the film is stretched at u. With s = 0 and n = 1 it is a Maxwell branch; with s
+near 1, or a large n, an ideal yielding element.
 """
 
 from __future__ import annotations
@@ -19,79 +20,81 @@ EFFECT = Effect(
     name="viscoplastic flow",
     family="viscoplasticity",
     acts_on="film stress",
-    summary="beyond a stress the film flows with a time of its own, and keeps a set",
+    summary="the film flows with a power of the stress, beyond a threshold or without one",
     law=Law(
         equations=(
             r"\sigma = \sigma_0 + Y \frac{z}{r}",
-            r"\dot{z} = \dot{\lambda} - \frac{1}{T} \max(|z| - r, 0) \operatorname{sign} z",
+            (
+                r"\dot{z} = \dot{\lambda} - 0.01\,\mathrm{s}^{-1} \left(\frac{\max(|z|/r - s, 0)}"
+                r"{1 - s}\right)^n \operatorname{sign} z"
+            ),
         ),
-        symbols=("Y", "r", "T"),
-        source="G. Duvaut and J.-L. Lions, Les inequations en mecanique et en physique (1972)",
-        where=(("z", "elastic stretch of the element"),),
+        symbols=("Y", "r", "s", "n"),
+        source="P. Perzyna, Adv. Appl. Mech. 9, 243 (1966); with s = 0 Norton's law of creep",
+        where=(("z", "elastic stretch of the element"), ("r", "that at which it bears Y")),
     ),
     parameters=(
-        Parameter("yield_stress", "Pa", (0.0, 2e5), "from which on the film flows", 150.0, 0.0),
+        Parameter("flow_stress", "Pa", (0.0, 2e5), "while it flows at 0.01/s", 150.0, 0.0),
         Parameter(
-            "reach",
-            "",
-            (2e-4, 1.0),
-            "change of stretch at which it begins to flow",
-            3e-3,
-            starts=(3e-3, 1e-3, 1e-2),
-            logarithmic=True,
+            "reach", "", (2e-4, 1.0), "change of stretch at which it bears that stress", 5e-3,
+            starts=(5e-3, 1.5e-3, 1.5e-2), logarithmic=True,
         ),
         Parameter(
-            "time_constant",
-            "s",
-            (2e-3, 100.0),
-            "in which the stress beyond the threshold relaxes",
-            0.2,
-            starts=(0.2, 1.5),
-            logarithmic=True,
+            "threshold", "", (0.0, 0.99), "part of that stress below which nothing flows", 0.1,
+            starts=(0.5, 0.0),
+        ),
+        Parameter(
+            "exponent", "", (1.0, 20.0), "of the rate over the stress", 2.0,
+            starts=(1.5, 4.0), logarithmic=True,
         ),
     ),
     memory=1,
     is_hysteretic=True,
     drives=("voltage", "stretch"),
-)
+)  # fmt: skip
+
+_RATE = 0.01  # 1/s: of a film that moves by a tenth of a millimetre in a second
+_TRAVEL = 0.1  # reaches, of a part of a step: within 1e-2 of the stress at any rate
+_LITTLE = 0.02  # of the exponent, a relaxation: the series is within 3e-6
+_NEARLY_LINEAR = 1e-6  # above 1, an exponent
+_PARTS = 200  # of a step: 20 reaches, far beyond which the film flows steadily
 
 
 @jit
-def _flowed(z, travel, since, reach, time):
-    """Elastic stretch after ``since`` s, in which the film is stretched steadily by ``travel``."""
-    if since <= 0.0:
-        return z + travel
-    rate, left = travel / since, since
-    # elastic, beyond one threshold, elastic again and beyond the other: no more parts than that
-    for _ in range(4):
-        if left <= 0.0:
-            break
-        side = math.copysign(1.0, z if z != 0.0 else rate)
-        beyond = side * z - reach
-        if beyond < 0.0 or (beyond == 0.0 and side * rate <= 0.0):
-            if rate == 0.0:
-                break
-            way = math.copysign(1.0, rate)
-            needed = (way * reach - z) / rate
-            if needed >= left:
-                return z + rate * left
-            z = way * reach
-            left -= needed
-            beyond, side = 0.0, way
-        steady = side * rate * time
-        parts = left
-        if steady < 0.0 < beyond:
-            parts = min(left, time * math.log1p(-beyond / steady))
-        z = side * (reach + steady + (beyond - steady) * math.exp(-parts / time))
-        if parts < left:
-            z = side * reach  # back at the threshold: elastic from here
-        left -= parts
-    return z
+def _relaxed(c, k, z, h):
+    """Elastic stretch after ``h`` s without travel."""
+    edge = c[k + 2] * c[k + 1]
+    width, more = c[k + 1] - edge, c[k + 3] - 1.0
+    over = (abs(z) - edge) / width
+    if over <= 0.0:
+        return z
+    late = h * _RATE / width * over**more
+    if c[k + 3] * late < _LITTLE:
+        left = 1.0 - late * (1.0 - 0.5 * (more + 1.0) * late)
+    elif more < _NEARLY_LINEAR:
+        left = math.exp(-late)
+    else:
+        left = math.exp(-math.log1p(more * late) / more)
+    return math.copysign(edge + width * over * left, z)
+
+
+@jit
+def _flowed(c, k, z, travel, since):
+    """Elastic stretch after ``since`` s, in which the film is stretched steadily by ``travel``.
+
+    It relaxes for half of each part of the step, is stretched, and relaxes for the other half.
+    """
+    parts = 1 + int(min(abs(travel) / (_TRAVEL * c[k + 1]), _PARTS))
+    h = since / parts
+    z = _relaxed(c, k, z, 0.5 * h)
+    for _ in range(parts - 1):
+        z = _relaxed(c, k, z + travel / parts, h)
+    return _relaxed(c, k, z + travel / parts, 0.5 * h)
 
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    return c[k] / c[k + 1] * _flowed(m[j], lam - lam0, since, c[k + 1], c[k + 2])
+    return c[k] / c[k + 1] * _flowed(c, k, m[j], lam - lam0, since)
 
 
 @jit
@@ -101,5 +104,5 @@ def stiffness(c, k, m, j, lam, rate):
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    m[j] = _flowed(m[j], lam - lam0, h, c[k + 1], c[k + 2])
+    m[j] = _flowed(c, k, m[j], lam - lam0, h)
     return 0

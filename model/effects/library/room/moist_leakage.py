@@ -11,6 +11,12 @@ import math
 from dearig.model.coefficients import AIR_HUMIDITY
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Effect, Law, Parameter
+from dearig.model.effects.library.room.moist_stiffness import (
+    CRANK,
+    SORPTION,
+    SORPTION_TIME,
+    WETNESS,
+)
 from dearig.model.effects.shared.conduction import REMEMBERED, behind, dropped
 from dearig.model.effects.shared.filters import lagged
 
@@ -24,16 +30,11 @@ EFFECT = Effect(
     law=Law(
         equations=(
             r"V \left(1 + \frac{s}{1 - s} \exp(g w)\right) = U",
-            r"\tau \dot{w} = h - \frac{1}{2} - w, \quad w(0) = h(0) - \frac{1}{2}",
+            SORPTION,
         ),
         symbols=("s", "g", r"\tau"),
-        source="J. Crank, The Mathematics of Diffusion, 2nd ed., section 4.3 (1975)",
-        where=(
-            (
-                "w",
-                ("moisture: the relative humidity with which the film is in equilibrium, less 1/2"),
-            ),
-        ),
+        source=CRANK,
+        where=WETNESS,
     ),
     parameters=(
         Parameter("loss", "", (0.0, 0.5), "relative loss of voltage at 50 % humidity", 0.02, 0.0),
@@ -45,15 +46,7 @@ EFFECT = Effect(
             4.0,
             starts=(4.0, 8.0),
         ),
-        Parameter(
-            "sorption_time",
-            "s",
-            (10.0, 1e6),
-            "in which the film follows the humidity",
-            1e3,
-            starts=(1e3, 1e5),
-            logarithmic=True,
-        ),
+        SORPTION_TIME,
     ),
     memory=REMEMBERED + 1,
     needs="humidity",

@@ -8,7 +8,13 @@ from __future__ import annotations
 from dearig.model.coefficients import AIR_HUMIDITY
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Effect, Law, Parameter
-from dearig.model.effects.shared.filters import lagged
+from dearig.model.effects.library.room.moist_stiffness import (
+    CRANK,
+    SORPTION,
+    SORPTION_TIME,
+    WETNESS,
+    breathe,
+)
 
 __all__ = ["EFFECT", "breathe", "permittivity"]
 
@@ -20,16 +26,11 @@ EFFECT = Effect(
     law=Law(
         equations=(
             r"\sigma_E = \max(1 + a w, 0.02)\,\sigma_M",
-            r"\tau \dot{w} = h - \frac{1}{2} - w, \quad w(0) = h(0) - \frac{1}{2}",
+            SORPTION,
         ),
         symbols=("a", r"\tau"),
-        source="J. Crank, The Mathematics of Diffusion, 2nd ed., section 4.3 (1975)",
-        where=(
-            (
-                "w",
-                ("moisture: the relative humidity with which the film is in equilibrium, less 1/2"),
-            ),
-        ),
+        source=CRANK,
+        where=WETNESS,
     ),
     parameters=(
         Parameter(
@@ -40,25 +41,11 @@ EFFECT = Effect(
             0.1,
             0.0,
         ),
-        Parameter(
-            "sorption_time",
-            "s",
-            (10.0, 1e6),
-            "in which the film follows the humidity",
-            1e3,
-            starts=(1e3, 1e5),
-            logarithmic=True,
-        ),
+        SORPTION_TIME,
     ),
     memory=1,
     needs="humidity",
 )
-
-
-@jit
-def breathe(c, k, m, j, warmth, moisture, h):
-    m[j] = lagged(m[j], moisture, moisture, h, c[k + 1])
-    return 0
 
 
 @jit

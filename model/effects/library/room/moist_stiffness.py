@@ -15,6 +15,22 @@ from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "at_rest", "breathe", "soften"]
 
+#: How moisture follows the room: of every effect of it.
+SORPTION = r"\tau \dot{w} = h - \frac{1}{2} - w, \quad w(0) = h(0) - \frac{1}{2}"
+WETNESS = (
+    ("w", "moisture: the relative humidity with which the film is in equilibrium, less 1/2"),
+)
+CRANK = "J. Crank, The Mathematics of Diffusion, 2nd ed., section 4.3 (1975)"
+SORPTION_TIME = Parameter(
+    "sorption_time",
+    "s",
+    (10.0, 1e6),
+    "in which the film follows the humidity",
+    1e3,
+    starts=(1e3, 1e5),
+    logarithmic=True,
+)
+
 EFFECT = Effect(
     name="moist stiffness",
     family="humidity",
@@ -23,16 +39,11 @@ EFFECT = Effect(
     law=Law(
         equations=(
             r"\sigma = (1 + a w) \sigma_0",
-            r"\tau \dot{w} = h - \frac{1}{2} - w, \quad w(0) = h(0) - \frac{1}{2}",
+            SORPTION,
         ),
         symbols=("a", r"\tau"),
-        source="J. Crank, The Mathematics of Diffusion, 2nd ed., section 4.3 (1975)",
-        where=(
-            (
-                "w",
-                ("moisture: the relative humidity with which the film is in equilibrium, less 1/2"),
-            ),
-        ),
+        source=CRANK,
+        where=WETNESS,
     ),
     parameters=(
         Parameter(
@@ -43,15 +54,7 @@ EFFECT = Effect(
             0.1,
             0.0,
         ),
-        Parameter(
-            "sorption_time",
-            "s",
-            (10.0, 1e6),
-            "in which the film follows the humidity",
-            1e3,
-            starts=(1e3, 1e5),
-            logarithmic=True,
-        ),
+        SORPTION_TIME,
     ),
     memory=1,
     needs="humidity",
