@@ -94,11 +94,14 @@ def _install_packages(packages: list[str], why: str) -> None:
     subprocess.run([*become, apt, "install", "-y", "-qq", *packages], check=True, env=environment)
 
 
-def run(arguments: list[str], **environment: str) -> int:
-    """Run a command in the project's folder and return its exit code."""
+def run(arguments: list[str], *, quiet: bool = False, **environment: str) -> int:
+    """Run a command in the project's folder and return its exit code; errors alone if ``quiet``."""
     # modules are compiled when they are first imported, and only then
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "", **environment}
     try:
-        return subprocess.run(arguments, cwd=ROOT, check=False, env=environment).returncode
+        out = subprocess.DEVNULL if quiet else None
+        return subprocess.run(
+            arguments, cwd=ROOT, check=False, env=environment, stdout=out
+        ).returncode
     except KeyboardInterrupt:
         return 130

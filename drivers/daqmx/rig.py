@@ -356,7 +356,10 @@ class DaqmxRig:
 
     @contextmanager
     def _guardian_named(self) -> Iterator[None]:
-        """Add to an error of the card what the guardian did, or that it gives no answer."""
+        """Name with an error of the card what the guardian did, or that it gives no answer.
+
+        What it did comes first: the error follows from it, and names another cause.
+        """
         try:
             yield
         except RigStateError:
@@ -367,7 +370,7 @@ class DaqmxRig:
             if acted is not None and acted.sentence in str(error):
                 raise
             if acted is not None:
-                raise RigError(f"{error}; {acted.sentence}", error.code) from error
+                raise RigError(f"{acted.sentence}; after that, {error}", error.code) from error
             if self._run is not None and self._run.unguarded and error.code is not None:
                 raise RigError(f"{error}; {_UNGUARDED}", error.code) from error
             raise

@@ -314,16 +314,10 @@ class Problem:
             stress, status, _ = stress_of(c[0], record.time, record.stretch)
             return stress[None], status, record.time.size
         drive, fidelity = self._drive(record, coarse)
-        members = len(c)
-        # in quick steps a film alone ends elsewhere than in a pack, and costs are compared
-        if fidelity == kernel.COARSE and self._in_packs(c[0]):
-            others = WIDTH - len(films)
-            c = np.vstack([c, np.repeat(c[:1], others, axis=0)])
-            films = [*films, *([members + i] for i in range(others))]
         moved, statuses, steps = readings_of(
             c, self._length, drive, record.lag, fidelity, record.time, films
         )
-        return record.seen(moved[:members]), statuses[:members], steps
+        return record.seen(moved), statuses, steps
 
     @property
     def _length(self) -> float:

@@ -50,7 +50,6 @@ from dearig.model.kinematics import electric
 
 __all__ = [
     "LOG",
-    "drive_alone",
     "drive_by_voltage",
     "drive_with_log",
     "log_interval",
@@ -292,26 +291,19 @@ def _follow(
 
 
 @allocating
-def drive_alone(
-    c: np.ndarray,
-    time: np.ndarray,
-    voltage: np.ndarray,
-    ends: np.ndarray,
-    air: np.ndarray,
-    y: np.ndarray,
-    stretch: np.ndarray,
-    rate: np.ndarray,
-    fidelity: int,
-    others: int,
-    log: np.ndarray,
-) -> tuple[int, int, int]:
-    """Do what ``drive_with_log`` does: the arrays it needs, and the loop."""
+def _prepared(
+    c: np.ndarray, y: np.ndarray, fidelity: int, others: int, log: np.ndarray
+) -> tuple[Policy, int, np.ndarray, Workspace]:
+    """Return the steps of film ``c``, its effects, its coefficients with all inertia, and arrays.
+
+    Whoever makes arrays counts their owners, in every call: the loop must not. And what calls the
+    loop from compiled code contains it: it would be compiled once more.
+    """
     springs = spring_table(c)
     c = c.copy()
     acting = active_effects(c)
     c[INERTIA] += added_inertia(acting, c, y)
     policy = policy_of(acting, acting | others, is_swift(c), fidelity)
-    # whoever makes arrays counts their owners, in every call: the loop must not
     room = Workspace(
         springs,
         film_table(c, springs) if policy.exponential else np.zeros(0),
@@ -323,7 +315,7 @@ def drive_alone(
         np.zeros(5),
         log,
     )
-    return _follow(policy, acting, c, time, voltage, ends, air, y, stretch, rate, room)
+    return policy, acting, c, room
 
 
 def drive_by_voltage(
@@ -375,4 +367,5 @@ def drive_with_log(
     entered in ``log`` (N, LOG), see ``log_interval``; it may be (0, LOG).
     """
     drive = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
-    return drive_alone(c, *drive, y, stretch, rate, fidelity, others, log)
+    policy, acting, own, room = _prepared(c, y, fidelity, others, log)
+    return _follow(policy, acting, own, *drive, y, stretch, rate, room)

@@ -40,7 +40,10 @@ from dearig.model.kernel.motion import STRETCH_MAX, spring_table
 from dearig.model.kernel.propagator import PROPAGATOR, PROPAGATORS, propagator_for
 from dearig.model.kernel.status import NOT_CONVERGED, OK
 
-__all__ = ["drive_in_lanes"]
+__all__ = ["carry_in_lanes", "drive_in_lanes"]
+
+_Array = np.ndarray
+_Arrays = tuple[_Array, _Array, _Array, _Array, _Array, _Array]
 
 _GRAIN = 1e-3  # of the stiffness: propagators of a log differ by more, see STIFFNESS_NEAR
 
@@ -112,7 +115,7 @@ def _follow(
     moved: np.ndarray,
     rate: np.ndarray,
 ) -> bool:
-    """Carry packs of films along a record: the loop of ``_drive``."""
+    """Carry packs of films along a record: as ``log`` (N, LOG) says."""
     films, samples = moved.shape
     packs = tables.shape[0]
     moving = 0
@@ -155,17 +158,8 @@ def _follow(
 
 
 @allocating
-def _drive(
-    cs: np.ndarray,
-    time: np.ndarray,
-    voltage: np.ndarray,
-    ends: np.ndarray,
-    air: np.ndarray,
-    log: np.ndarray,
-    moved: np.ndarray,
-    rate: np.ndarray,
-) -> bool:
-    """Carry films ``cs`` (P, C) from rest along the record, as ``log`` (N, LOG) says."""
+def _packed(cs: np.ndarray) -> _Arrays:
+    """Return the first six arrays of ``_follow`` for films ``cs`` (P, C) at rest."""
     films = cs.shape[0]
     packs = (films + WIDTH - 1) // WIDTH
     values = np.zeros((packs, WIDTH, cs.shape[1]))
@@ -185,8 +179,26 @@ def _drive(
         origin[p, 0, i] = c[REST]
         # a branch that is missing does not move from 1
         y[p, 2 + branch_count(c) :, i] = 1.0 - c[REST]
+    return values, acting, memory, tables, y, origin
+
+
+def carry_in_lanes(
+    cs: np.ndarray,
+    time: np.ndarray,
+    voltage: np.ndarray,
+    ends: np.ndarray,
+    air: np.ndarray,
+    log: np.ndarray,
+    moved: np.ndarray,
+    rate: np.ndarray,
+) -> bool:
+    """Carry films ``cs`` (P, C) from rest along a record, in the steps of ``log`` (N, LOG).
+
+    The rest is as in ``drive_in_lanes``. Returns False where a film runs away.
+    """
+    record = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
     return _follow(
-        values, acting, memory, tables, y, origin, time, voltage, ends, air, log,
+        *_packed(cs), *record, log,
         np.zeros((PROPAGATORS, PROPAGATOR)), np.zeros((2, BRANCHES_MAX)), np.empty((7, 3, 3)),
         np.zeros((5, WIDTH)), moved, rate,
     )  # fmt: skip
@@ -223,8 +235,7 @@ def drive_in_lanes(
     )
     shared = status == OK and bool(log[:-1, 0].all())
     if shared:
-        record = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
-        shared = _drive(cs, *record, log, moved, rate)
+        shared = carry_in_lanes(cs, time, voltage, ends, air, log, moved, rate)
         # a step of a pack takes as long as one of a film
         steps += steps * -(-len(cs) // WIDTH)
     return OK if shared else NOT_CONVERGED, steps

@@ -13,13 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, HELD, INERTIA, REST
-from dearig.model.coefficients import WIDTH as NUMBERS
 from dearig.model.compiled.jit import allocating, inlined, jit, read_only
 from dearig.model.compiled.packs import WIDTH, rows
 from dearig.model.effects import MEMORY, SENSOR_MEMORY
-from dearig.model.film.network import HEAD, branch_count
+from dearig.model.film.network import branch_count
 from dearig.model.film.sensor import at_sensor
-from dearig.model.kernel.drive import LOG, drive_alone, start_ringing
+from dearig.model.kernel.drive import LOG, drive_with_log, start_ringing
 from dearig.model.kernel.effect_forces import MOVING, active_effects
 from dearig.model.kernel.exponential_rk import (
     BRANCHES_MAX,
@@ -37,7 +36,7 @@ from dearig.model.kernel.propagator import (
 )
 from dearig.model.kernel.rest import rest_stretch
 from dearig.model.kernel.sensor import read_sensor
-from dearig.model.kernel.status import OK
+from dearig.model.kernel.status import COARSE, OK
 from dearig.model.kernel.step_control import (
     EVEN,
     LOOK_EVERY,
@@ -285,9 +284,19 @@ def _in_pack(
 
 
 @jit
-def _goes_in_a_pack(c: np.ndarray) -> bool:
-    """Whether film ``c`` may step with others."""
-    return is_swift(c) and active_effects(c) & MOVING == 0
+def _settle(pack: np.ndarray, status: np.ndarray) -> bool:
+    """Enter the stretches at rest in films ``pack`` (WIDTH, C), and how they were found.
+
+    Returns whether the films may step with one another.
+    """
+    together = True
+    for i in range(pack.shape[0]):
+        c = pack[i]
+        found, c[REST] = rest_stretch(c, 0.0)
+        if i < status.shape[0]:
+            status[i] = found
+        together = together and found == OK and is_swift(c) and active_effects(c) & MOVING == 0
+    return together
 
 
 @allocating
@@ -324,60 +333,6 @@ def read_members(
         read_sensor(cs[member], at, shown, speed, memory)
 
 
-@allocating
-def _read(
-    cs: np.ndarray,
-    films: np.ndarray,
-    film_of: np.ndarray,
-    length: float,
-    time: np.ndarray,
-    voltage: np.ndarray,
-    ends: np.ndarray,
-    air: np.ndarray,
-    lag: float,
-    at: np.ndarray,
-    fidelity: int,
-    readings: np.ndarray,
-    status: np.ndarray,
-) -> int:
-    """Do what ``read_population`` does."""
-    count, samples, taken = films.shape[0], time.shape[0], 0
-    stretch, rate = np.empty((WIDTH, samples)), np.empty((WIDTH, samples))
-    pack = np.empty((WIDTH, cs.shape[1]))
-    log = np.zeros((0, LOG))
-    for begin in range(0, count, WIDTH):
-        here = min(WIDTH, count - begin)
-        together = here >= _WORTH
-        for i in range(WIDTH):
-            pack[i] = cs[films[begin + min(i, here - 1)]]
-            found, pack[i, REST] = rest_stretch(pack[i], 0.0)
-            if i < here:
-                status[begin + i] = found
-            together = together and found == OK and _goes_in_a_pack(pack[i])
-        if together:
-            together, steps = _in_pack(pack, time, voltage, ends, fidelity, stretch, rate)
-            taken += steps
-        for i in range(here):
-            rest = pack[i, REST]
-            if status[begin + i] != OK:
-                stretch[i], rate[i] = 0.0, 0.0
-                continue
-            if not together:
-                branches = (pack.shape[1] - HEAD) // NUMBERS - 1
-                y = np.zeros(2 + branches + MEMORY)
-                y[: 2 + branches] = rest
-                y[1] = 0.0
-                status[begin + i], _, steps = drive_alone(
-                    pack[i], time, voltage, ends, air, y, stretch[i], rate[i], fidelity, 0, log
-                )
-                taken += steps
-            stretch[i] -= rest
-        read_members(
-            cs, film_of, begin, begin + here, length, time, stretch, rate, lag, at, readings
-        )
-    return taken
-
-
 def read_population(
     cs: np.ndarray,
     films: np.ndarray,
@@ -401,7 +356,35 @@ def read_population(
     (M,) s, of the film as it was ``lag`` s before. What a film did not reach reads as far as it
     came. A step of a pack counts as one.
     """
-    record = (read_only(time), read_only(voltage), read_only(ends), read_only(air))
-    return _read(
-        cs, films, film_of, length, *record, lag, read_only(at), fidelity, readings, status
-    )
+    record = (read_only(time), read_only(voltage), read_only(ends))
+    air, at = read_only(air), read_only(at)
+    stretch, rate = np.empty((2, WIDTH, time.size))
+    log, taken = np.zeros((0, LOG)), 0
+    for begin in range(0, films.size, WIDTH):
+        end = min(begin + WIDTH, films.size)
+        # the last film fills a pack
+        pack = cs[films[np.minimum(np.arange(begin, begin + WIDTH), end - 1)]]
+        together = _settle(pack, status[begin:end])
+        # in quick steps a film alone ends elsewhere than in a pack, and costs are compared
+        if together and (end - begin >= _WORTH or fidelity == COARSE):
+            together, steps = _in_pack(pack, *record, fidelity, stretch, rate)
+            taken += steps
+        else:
+            together = False
+        for i in range(end - begin):
+            rest = pack[i, REST]
+            if status[begin + i] != OK:
+                stretch[i], rate[i] = 0.0, 0.0
+                continue
+            if not together:
+                branches = branch_count(pack[i])
+                y = np.zeros(2 + branches + MEMORY)
+                y[: 2 + branches] = rest
+                y[1] = 0.0
+                status[begin + i], _, steps = drive_with_log(
+                    pack[i], *record, air, y, stretch[i], rate[i], fidelity, 0, log
+                )
+                taken += steps
+            stretch[i] -= rest
+        read_members(cs, film_of, begin, end, length, time, stretch, rate, lag, at, readings)
+    return taken

@@ -4,9 +4,9 @@
 in real time, in a folder of 200 recordings; in its midst each page that was not shown yet is
 opened, and each other act of ``acts`` is done, while presses of a key are sent all the time from
 another thread. The delay is the time from the sending of the press to its being heard. Work is the
-processor time of the window's thread between two presses that it has heard: a press waits as long
-on a computer that does nothing else. The first rows are of a window that makes a page when
-it is opened, the others of the window as it is.
+processor time of one turn of the window's loop: a press waits as long on a computer that does
+nothing else, and other programs change it little. The first rows are of a window that makes a page
+when it is opened, the others of the window as it is.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pathlib import Path
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # before Qt is loaded
 
 import numpy as np
-from PySide6.QtCore import QEvent, QEventLoop, QSettings, Qt, QTimer
+from PySide6.QtCore import QAbstractEventDispatcher, QEventLoop, QSettings, Qt, QTimer
 from PySide6.QtWidgets import QApplication, QDialog
 
 from dearig.report.study_view import view_of
@@ -53,20 +53,25 @@ repeats = 1000
 
 
 class Presses(Listener):
-    """Hears presses of STOP, and how long the window's thread has worked between them."""
+    """Hears presses of STOP, and how long each turn of the window's loop has worked."""
 
     PAUSE = 0.004  # shorter than any work that counts: one press for each turn of the loop
 
     def __init__(self) -> None:
         self.worked: list[float] = []
         self._before = time.thread_time()
+        self._loop = QAbstractEventDispatcher.instance()
+        self._loop.awake.connect(self._turn)
         super().__init__()
 
-    def event(self, event: QEvent) -> bool:
+    def _turn(self) -> None:
         now = time.thread_time()
         self.worked.append(now - self._before)
         self._before = now
-        return super().event(event)
+
+    def close(self) -> None:
+        self._loop.awake.disconnect(self._turn)
+        super().close()
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -136,22 +141,23 @@ def acts(window: MainWindow, folder: Path) -> Iterator[tuple[str, Callable[[], o
     yield "Reset layout", window.reset_layout
 
 
-def heard(act: Callable[[], object]) -> list[tuple[float, float]]:
-    """Return delays and work in ms of the presses that are sent while ``act`` is done."""
+Heard = tuple[list[float], list[float]]  # ms
+
+
+def heard(act: Callable[[], object]) -> Heard:
+    """Return delays of the presses that are sent while ``act`` is done, and works of turns."""
     listener = Presses()
     run_event_loop(0.2)
     act()
     run_event_loop(0.8)
     listener.close()
     run_event_loop(0.05)
-    return [(1e3 * d, 1e3 * w) for d, w in zip(listener.delays, listener.worked, strict=False)]
+    return [1e3 * delay for delay in listener.delays], [1e3 * work for work in listener.worked]
 
 
-def measure(
-    ready: bool, folder: Path, only: str, collector: Collector
-) -> dict[str, list[tuple[float, float]]]:
+def measure(ready: bool, folder: Path, only: str, collector: Collector) -> dict[str, Heard]:
     """Return delays and work in ms by what was done; ``ready``: as the window is."""
-    delays: dict[str, list[tuple[float, float]]] = {}
+    delays: dict[str, Heard] = {}
     settings = QSettings(str(folder / "x.ini"), QSettings.Format.IniFormat)
     settings.clear()
     window = MainWindow(Session(folder, settings, theme=LIGHT))
@@ -201,13 +207,14 @@ def main() -> None:
         folder = Path(place)
         many_recordings(folder)
         for ready in (False, True):
-            found: dict[str, list[tuple[float, float]]] = {}
+            found: dict[str, Heard] = {}
             for _ in range(given.repeats):
-                for title, delays in measure(ready, folder, given.only, collector).items():
-                    found.setdefault(title, []).extend(delays)
+                for title, parts in measure(ready, folder, given.only, collector).items():
+                    for whole, part in zip(found.setdefault(title, ([], [])), parts, strict=True):
+                        whole.extend(part)
             words = "as it is" if ready else "pages made when opened"
-            for title, delays in found.items():
-                late, worked = np.array(delays).T
+            for title, (delays, works) in found.items():
+                late, worked = np.array(delays), np.array(works)
                 row = f"| {words} | {title} | {late.size} | {np.median(late):.1f} |"
                 print(f"{row} {late.max():.0f} | {worked.max():.0f} |", flush=True)
     collector.close()

@@ -81,7 +81,7 @@ class Flow(QLayout):
             free = area.width() - self._width(line)
             shares = sum(share for _, share in line)
             for item, share in line:
-                width = min(item.sizeHint().width(), area.width())
+                width = min(_wanted(item), area.width())
                 width += free * share // shares if shares and free > 0 else 0
                 item.setGeometry(QRect(QPoint(left, top), QSize(width, height)))
                 left += width + self.spacing()
@@ -104,7 +104,12 @@ class Flow(QLayout):
         return lines
 
     def _width(self, line: list[tuple[QLayoutItem, int]]) -> int:
-        return sum(i.sizeHint().width() for i, _ in line) + self.spacing() * (len(line) - 1)
+        return sum(_wanted(item) for item, _ in line) + self.spacing() * (len(line) - 1)
 
     def _height(self, line: list[tuple[QLayoutItem, int]]) -> int:
         return max((item.sizeHint().height() for item, _ in line), default=0)
+
+
+def _wanted(item: QLayoutItem) -> int:
+    """Width in px that ``item`` asks for; the hint of a widget that takes what is left may be 0."""
+    return max(item.sizeHint().width(), item.minimumSize().width())

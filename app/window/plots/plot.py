@@ -125,6 +125,8 @@ class Plot(pg.PlotItem):
         self.layout.addItem(self.key, 0, 1)
         self.set_axis("left", left)
         self.set_axis("bottom", bottom)
+        # a row of the key changes the height of the view, and not that of the plot
+        self.vb.sigResized.connect(lambda *_: self._show_label("left"))
 
     # axes
 
@@ -153,6 +155,8 @@ class Plot(pg.PlotItem):
             # the styles that are given replace all others
             colour = self.getAxis(side).textPen().color().name()
             self.setLabel(side, words, **{"font-size": f"{points:g}pt", "color": colour})
+            # pyqtgraph centres a label only when the axis changes its size
+            self.getAxis(side).resizeEvent()
 
     def set_auto_y(self, auto: bool) -> None:
         """Let the y axis cover what is visible, or keep its range."""

@@ -53,6 +53,7 @@ __all__ = ["RecordingsPage"]
 
 _TOGETHER_MAX = 6  # recordings in one plot: the theme has six colours for curves
 _CHOOSE_MS = 80  # wait after a selection: arrow keys pass over many rows
+_COUNT = 230  # px, of the number of recordings
 _OPEN_MODEL = "Open a model file …"
 
 
@@ -181,7 +182,9 @@ class RecordingsPage(Page):
         self.model_box.activated.connect(self._model_chosen)
         compare_label = QLabel("&Compare with")
         compare_label.setBuddy(self.model_box)
-        self.count = ElidedLabel("muted", hugging=True)
+        # of a width that its text does not change: else the row breaks, and the page is laid out
+        self.count = ElidedLabel("muted")
+        self.count.setMinimumWidth(_COUNT)
         self.subfolders = QCheckBox("Su&bfolders")
         self.subfolders.setChecked(self._library.deep)
         self.subfolders.setToolTip("List the recordings in subfolders too")
@@ -192,7 +195,7 @@ class RecordingsPage(Page):
         row.add(self.import_button)
         row.add(self.subfolders)
         row.add(self.filter, share=1)
-        row.add(self.count)
+        row.add(self.count, share=1)
         row.add(columns)
         row.add(compare_label, self.model_box)
         return row

@@ -222,6 +222,8 @@ class MainWindow(QMainWindow):
 
     @Slot()
     def _come_back(self) -> None:
+        if not (self.session.busy and self.isMinimized()):
+            return
         self.setWindowState(self.windowState() & ~Qt.WindowState.WindowMinimized)
         self.activateWindow()
         self.session.message.emit("The window stays open while STOP may be needed")

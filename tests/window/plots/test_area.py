@@ -541,6 +541,10 @@ def test_copies_are_a_picture_and_a_table(shown: Shown) -> None:
 def test_labels_of_low_plots_do_not_run_into_each_other(shown: Shown, height: int) -> None:
     shown.area.resize(900, height)
     QApplication.processEvents()
-    labels = [plot.getAxis("left").label for plot in (shown.voltage, shown.residual)]
+    axes = [plot.getAxis("left") for plot in (shown.voltage, shown.residual)]
+    labels = [axis.label for axis in axes]
+    for axis, label in zip(axes, labels, strict=True):  # also after it has got other words
+        middle = label.mapRectToScene(label.boundingRect()).center().y()
+        assert middle == pytest.approx(axis.sceneBoundingRect().center().y(), abs=3.0)
     above, below = (label.mapRectToScene(label.boundingRect()) for label in labels)
     assert above.bottom() <= below.top() + 8.0  # the margin of a document, above and below
