@@ -13,6 +13,7 @@ from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QWidget
 
+from dearig.config.rigform import SECTIONS
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
@@ -64,9 +65,7 @@ def main() -> None:
     # a limit that is lowered while another field is wrong
     type_into(rig.form("film").field("length_mm"), "x")
     until(lambda: "rig file" in session.blocks, "a wrong length")
-    bar = rig.tabs.tabBar()
-    at = bar.tabRect([rig.tabs.tabText(i) for i in range(bar.count())].index("limits")).center()
-    hand.click(bar.mapToGlobal(at))
+    click(rig.tabs.tab(list(SECTIONS).index("limits")))
     until(rig.form("limits").isVisible, "the limits")
     type_into(rig.form("limits").field("voltage_max_kV"), "5")
     until(lambda: "voltage_max_kV = 5" in rig.text, "a lower limit")
@@ -78,7 +77,7 @@ def main() -> None:
     application.primaryScreen().grabWindow(0).toImage().save(str(folder / "screen.png"))
     hand.key("Control", "1")
     until(rig.isVisible, "the page of the rig again")
-    hand.click(bar.mapToGlobal(bar.tabRect(0).center()))
+    click(rig.tabs.tab(0))
     type_into(rig.form("film").field("length_mm"), "70,5")
     until(lambda: session.rig_file.film.length_mm == 70.5, "a right length")
     saw["limit"] = session.rig_file.limits.voltage_max_kV

@@ -40,6 +40,7 @@ from dearig.window.kit.form import Form
 from dearig.window.kit.number_box import WholeBox
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, button, card, label, plain_tip, set_wrong
+from dearig.window.kit.wrapped_tabs import WrappedTabs
 from dearig.window.rig.live_inputs import LiveInputs
 from dearig.window.session.page import Page
 from dearig.window.session.state import Session
@@ -247,7 +248,7 @@ class RigPage(Page):
                 self.forms[table].show_faults(keys)
             said |= {(table, k) for k in keys if k in SECTIONS[table].model_fields}
             mark = "✗ " if keys else ""
-            self.tabs.setTabText(i, f"{mark}{table}")
+            self.tabs.tab(i).setText(f"{mark}{table}")
         rest = [words for place, words in faults.items() if place not in said]
         errors = f"{len(faults)} error{'s' if len(faults) > 1 else ''}"
         head = ""
@@ -460,15 +461,14 @@ class RigPage(Page):
         column.addWidget(self.files.trouble)
         self.state = Message()
         column.addWidget(self.state)
-        self.tabs = QTabWidget()
-        self.tabs.setUsesScrollButtons(True)
+        self.tabs = WrappedTabs()
         for table in SECTIONS:
             area = QScrollArea()
             area.setWidgetResizable(True)
             area.setFrameShape(QScrollArea.Shape.NoFrame)
-            self.tabs.addTab(area, table)
+            self.tabs.add(area, table)
             self._areas[table] = area
-        self.tabs.currentChanged.connect(self._tab_changed)
+        self.tabs.current_changed.connect(self._tab_changed)
         self.form("film")
         column.addWidget(self.tabs, 1)
         return card(column)
@@ -486,7 +486,7 @@ class RigPage(Page):
 
     def show_table(self, table: str) -> None:
         """Show the tab of one table of the rig file."""
-        self.tabs.setCurrentIndex(list(SECTIONS).index(table))
+        self.tabs.show_page(list(SECTIONS).index(table))
 
     @Slot(int)
     def _tab_changed(self, place: int) -> None:

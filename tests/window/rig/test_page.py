@@ -6,11 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLineEdit, QWidget
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import write_default
+from dearig.config.rigform import SECTIONS
 from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from tests.window.conftest import Answers
@@ -74,6 +75,17 @@ def test_a_card_that_is_not_there_is_told(qtbot: QtBot, page: RigPage) -> None:
     assert "✗ Wrong" in [page.findings.item(r, 0).text() for r in range(page.findings.rowCount())]
 
 
+def test_every_table_of_the_rig_file_is_in_sight_in_a_narrow_window(page: RigPage) -> None:
+    page.resize(780, 600)
+    QApplication.processEvents()
+    for place, table in enumerate(SECTIONS):
+        tab = page.tabs.tab(place)
+        tab.click()
+        assert page.form(table).isVisible()
+        seen = QRect(tab.mapTo(page, QPoint()), tab.size())
+        assert page.rect().contains(seen), table
+
+
 def test_a_wrong_value_is_said_beside_its_field_and_not_used(qtbot: QtBot, page: RigPage) -> None:
     field = line(page, "limits", "voltage_max_kV")
     qtbot.keyClicks(field, "12")
@@ -103,7 +115,7 @@ def test_a_limit_beside_a_wrong_field_is_not_ignored_but_blocks_arming(
     assert block.page == "Rig"
     assert "film: length (mm)" in block.sentence
     assert "previous limits are in force: 0 to 8.5 kV" in block.sentence
-    assert page.tabs.tabText(0) == "✗ film"
+    assert page.tabs.tab(0).text() == "✗ film"
     slew = line(page, "limits", "slew_max_kV_per_s")
     slew.selectAll()
     qtbot.keyClicks(slew, "950000")  # what is wrong with several keys is told beside it
