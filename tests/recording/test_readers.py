@@ -94,7 +94,7 @@ def test_xarray_opens_it_with_each_engine(run: Path, engine: str | None, group: 
     assert not [name for name in sizes if name.startswith("phony")]
 
 
-@pytest.mark.parametrize("engine", mostly_deep(ENGINES, [None]))
+@pytest.mark.parametrize("engine", mostly_deep(ENGINES, []))
 def test_xarray_opens_it_as_a_tree(run: Path, engine: str | None) -> None:
     found = read_in(packages_of(engine), TREE.format(engine=engine), run)
     assert found == open_recording(run).displacement.tolist()

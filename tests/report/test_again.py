@@ -230,6 +230,7 @@ def test_figures_for_print(tmp_path: Path) -> None:
         assert "Simulated data: no measured data (rig sim:8, noise seed 3)." in figure["caption"]
 
 
+@pytest.mark.deep
 def test_figures_over_two_columns_have_text_that_is_text(tmp_path: Path) -> None:
     write_json(result_json(identify_outcome()), tmp_path / "r.json")
     out = tmp_path / "out"

@@ -70,7 +70,8 @@ DEEP = {
     "CSV of line ends", "CSV of quotation marks", "rig file of 50 MB", "10,000 segments",
     "JSON of 1,000,000 names", "CSV of 10,000,000 lines of names", "CSV of 1e400", "port of 1 MB",
     "instruments by the thousand", "fraction of 1 MB", "an effect of 100,000 values",
-    "100,000 keys", "thesis of 100,000 lobes", "100,000 tables in one line",
+    "100,000 keys", "a table of 100,000 tables", "CSV with a wrong last line",
+    "MAT that unpacks to 2 GB", "thesis of 100,000 lobes", "100,000 tables in one line",
 }  # fmt: skip
 
 

@@ -115,6 +115,7 @@ def test_planted_code_in_a_folder_that_others_may_write_to_is_not_run(tmp_path: 
 
 
 @pytest.mark.skipif(os.name == "nt", reason="modes of this kind are not there on Windows")
+@pytest.mark.deep
 def test_a_planted_file_in_a_folder_that_was_open_once_is_not_run(tmp_path: Path) -> None:
     cache, mark = tmp_path / "cache", tmp_path / "mark"
     run(tmp_path, NUMBA_CACHE_DIR=str(cache))

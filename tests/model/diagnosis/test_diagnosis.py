@@ -342,6 +342,7 @@ def test_slack_explains_a_strip_whose_springs_do_not_stiffen():
     assert found.final.cost < 0.01 * found.baseline.cost
 
 
+@pytest.mark.deep
 def test_a_held_voltage_is_recognised():
     drive = thesis_drive()
     record = record_of(PLAIN, replace(drive, hold=True))

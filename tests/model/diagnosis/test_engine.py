@@ -100,6 +100,7 @@ def of_no_named_form() -> ActuatorRecord:
     return record_of(hidden, replace(thesis_drive(), hold=True))
 
 
+@pytest.mark.deep
 def test_a_form_that_no_law_with_a_name_has_is_found_by_the_general_law() -> None:
     record = of_no_named_form()
     found = diagnose([record], PLAIN, workers=1)
