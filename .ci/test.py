@@ -35,8 +35,8 @@ def test(python: Path, *arguments: str) -> int:
         return code
     return run(
         # The tests of a file stay together: what they share is made once. A third of their time is
-        # spent waiting for rigs, windows and clocks: four processes keep two cores at work.
-        [str(python), "-m", "pytest", "-n", "4", "--dist", "loadfile", *arguments],
+        # spent waiting for rigs, windows and clocks: three processes keep two cores at work.
+        [str(python), "-m", "pytest", "-n", "3", "--dist", "loadfile", *arguments],
         # threads of linear algebra would wait for each other
         OPENBLAS_NUM_THREADS="1",
     )

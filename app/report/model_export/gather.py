@@ -19,8 +19,9 @@ import numpy as np
 
 from dearig.errors import InputError
 
-__all__ = ["gathered"]
+__all__ = ["MOTION_BITS", "gathered"]
 
+MOTION_BITS = 63  #: of effects of the motion: of a 64-bit number that is not negative
 _LIBRARIES = {"math", "numpy"}
 _SCALARS = (bool, int, float, str, type(None))
 
@@ -36,7 +37,7 @@ def gathered(
         Functions, compiled or not.
     bits : int
         Bits of the effects that the model has (``assembly.active`` and ``active_sensors``): those
-        of the motion, and above 62 bits those of the sensor.
+        of the motion, and above ``MOTION_BITS`` those of the sensor.
     springs : iterable of int
         Codes of the strain energies that the model has.
 
@@ -102,7 +103,8 @@ class _Gatherer:
         tree: ast.AST = _Bare().visit(ast.parse(source)).body[0]
         if thing.__module__.endswith("assembled_hooks"):
             sensor = thing.__name__ in ("sense", "active_sensors")
-            tree = _Pruned(self.bits >> 62 if sensor else self.bits & ((1 << 62) - 1)).visit(tree)
+            of_sensor, of_motion = divmod(self.bits, 1 << MOTION_BITS)
+            tree = _Pruned(of_sensor if sensor else of_motion).visit(tree)
         if thing.__module__.endswith("assembled_laws"):
             tree = _OfSprings(self.springs).visit(tree)
         return ast.fix_missing_locations(tree)

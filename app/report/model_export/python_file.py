@@ -37,7 +37,7 @@ from dearig.model.film.network import HEAD
 from dearig.model.film.sensor import at_sensor
 from dearig.model.simulation.actuator import STATUS_WORDS, Actuator, ends_of
 from dearig.model.simulation.film_kernel import add_effects, drive_by_stretch
-from dearig.report.model_export.gather import gathered
+from dearig.report.model_export.gather import MOTION_BITS, gathered
 
 __all__ = ["python_file"]
 
@@ -161,7 +161,7 @@ def python_file(given: ModelFile, version: str) -> str:
     c = model.coefficients()
     codes = {int(k) for k in c[HEAD + KIND :: WIDTH]}
     sensing = int(assembly.active_sensors(c)) if isinstance(model, Actuator) else 0
-    bits = int(assembly.active(c)) | sensing << 62
+    bits = int(assembly.active(c)) | sensing << MOTION_BITS
     if isinstance(model, Actuator):
         roots = (
             kernel.rest_stretch, ends_of, kernel.drive_by_voltage, at_sensor, kernel.read_sensor,
