@@ -74,7 +74,7 @@ IN_ACTUATORS = {"general sensor lag": {"age": 1.0 / RATE}}
 NEARER = {
     "mains interference": 1.00005,
     "vibration": 1.00005,
-    "swinging load": 1.002,
+    "swinging load": 1.0005,
     "sensor ripple": 1.05,
 }
 NEARER |= dict.fromkeys(("amplifier limit", "sensor saturation"), 0.8)
