@@ -1,7 +1,8 @@
 """Time of day that may be set while the program runs, against the time that has passed.
 
 The computer's clock is set by people, by time servers, and after a suspension. Deadlines and rests
-are measured by the time that has passed; a change of the clock is told where times of day are kept.
+are measured by the time that has passed; a change of the clock is reported where times of day are
+recorded.
 """
 
 from __future__ import annotations
@@ -9,9 +10,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-__all__ = ["ClockWatch", "UnixTime"]
+__all__ = ["TOLERANCE", "ClockWatch", "UnixTime"]
 
-_TOLERANCE = 1.0  # s that the two may differ; time servers shift a clock gradually by less
+TOLERANCE = 1.0  #: s that the two may differ; time servers shift a clock gradually by less
 
 
 class ClockWatch:
@@ -29,7 +30,7 @@ class ClockWatch:
         """Return how the clock was set since the last call, as a sentence; "" where it was not."""
         ahead = self._now() - self._clock()
         by = ahead - self._ahead
-        if abs(by) <= _TOLERANCE:
+        if abs(by) <= TOLERANCE:
             return ""
         self._ahead = ahead
         moment = time.strftime("%H:%M:%S", time.localtime(self._now()))

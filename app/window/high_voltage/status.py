@@ -17,7 +17,7 @@ from pathlib import Path
 from PySide6.QtCore import QLockFile, QObject, Qt, QTimer, Signal, Slot
 
 from dearig.acquisition.rigs import is_simulated
-from dearig.clock import ClockWatch
+from dearig.clock import TOLERANCE, ClockWatch
 from dearig.output_state import Known, OutputState
 from dearig.window.high_voltage.state import HighVoltage, kilovolts, state_at_rest
 from dearig.window.session.recovery import lock_of, unsaved_folder
@@ -37,7 +37,7 @@ __all__ = [
 
 log = logging.getLogger(__name__)
 
-#: s without a sample, beside the time of one, after which the last one is not that of now.
+#: s without a sample, on top of the time between two, after which the last one is out of date.
 SILENT = 1.0
 ARMED_FOR = 30.0  #: s after which a rig that was armed and not started is disarmed
 _CLOCK = 1.0  # s between two looks at the computer's clock
@@ -197,7 +197,7 @@ class HighVoltageStatus(QObject):
         else:
             output = self.output
             words = "the voltage was not read yet" if output is None else output.sentence
-            if output is not None and output.at > time.time() + _CLOCK:
+            if output is not None and output.at > time.time() + TOLERANCE:
                 words = f"{words}; the computer's clock was set back since then"
             if self._state is HighVoltage.BETWEEN:
                 words = f"{words}; {self._next}"

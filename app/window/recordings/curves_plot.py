@@ -132,13 +132,13 @@ class CurvesPlot(QWidget):
             )  # fmt: skip
         yield partial(_draw_curve, both, name, colour, curves.measured, shown.factor)
         if self._with_model and curves.model is not None and curves.residual is not None:
-            beside = theme.models[0] if alone else colour
+            model_colour = theme.models[0] if alone else colour
             yield partial(
-                own, both, "model" if alone else f"model of {name}", beside, curves.model,
+                own, both, "model" if alone else f"model of {name}", model_colour, curves.model,
                 shown.factor, dashed=not alone,
             )  # fmt: skip
             yield partial(
-                own, residual, "residual" if alone else name, beside, curves.residual,
+                own, residual, "residual" if alone else name, model_colour, curves.residual,
                 shown.error_factor,
             )  # fmt: skip
         if alone:
