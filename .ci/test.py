@@ -20,12 +20,13 @@ COLD = "import sys; from dearig.acquisition.warm_up import is_warm; sys.exit(not
 
 
 def compile_all(python: Path) -> int:
-    """Compile the kernels, those of runs beside those of fits; return the first exit code."""
+    """Compile the kernels of runs and of fits in two processes; return an exit code."""
     if not run([str(python), "-c", COLD]):
         return 0
     print("Compiling the numerical kernels, once for these sources ...", flush=True)
     with ThreadPoolExecutor() as both:
-        return max(both.map(lambda code: run([str(python), "-c", code], quiet=True), (RUNS, FITS)))
+        ended = both.map(lambda code: run([str(python), "-c", code], quiet=True), (RUNS, FITS))
+    return next(filter(None, ended), 0)  # that of a process ended by a signal is negative
 
 
 def test(python: Path, *arguments: str) -> int:
@@ -34,8 +35,8 @@ def test(python: Path, *arguments: str) -> int:
     if code := compile_all(python):
         return code
     return run(
-        # The tests of a file stay together: what they share is made once. A third of their time is
-        # spent waiting for rigs, windows and clocks: three processes keep two cores at work.
+        # The tests of a file stay together: what they share is made once. About a third of the time
+        # a test waits for a rig or a window: a third process uses the cores meanwhile.
         [str(python), "-m", "pytest", "-n", "3", "--dist", "loadfile", *arguments],
         # threads of linear algebra would wait for each other
         OPENBLAS_NUM_THREADS="1",

@@ -366,11 +366,10 @@ def read_population(
         pack = cs[films[np.minimum(np.arange(begin, begin + WIDTH), end - 1)]]
         together = _settle(pack, status[begin:end])
         # in quick steps a film alone ends elsewhere than in a pack, and costs are compared
-        if together and (end - begin >= _WORTH or fidelity == COARSE):
+        together = together and (end - begin >= _WORTH or fidelity == COARSE)
+        if together:
             together, steps = _in_pack(pack, *record, fidelity, stretch, rate)
             taken += steps
-        else:
-            together = False
         for i in range(end - begin):
             rest = pack[i, REST]
             if status[begin + i] != OK:

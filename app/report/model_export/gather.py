@@ -19,15 +19,14 @@ import numpy as np
 
 from dearig.errors import InputError
 
-__all__ = ["MOTION_BITS", "gathered"]
+__all__ = ["gathered"]
 
-MOTION_BITS = 63  #: of effects of the motion: of a 64-bit number that is not negative
 _LIBRARIES = {"math", "numpy"}
 _SCALARS = (bool, int, float, str, type(None))
 
 
 def gathered(
-    roots: Iterable[Callable[..., Any]], bits: int, springs: Iterable[int]
+    roots: Iterable[Callable[..., Any]], of_motion: int, of_sensor: int, springs: Iterable[int]
 ) -> tuple[str, dict[str, str]]:
     """Return the source of ``roots`` and all that they use, and the name of each root in it.
 
@@ -35,9 +34,8 @@ def gathered(
     ----------
     roots : iterable of callable
         Functions, compiled or not.
-    bits : int
-        Bits of the effects that the model has (``assembly.active`` and ``active_sensors``): those
-        of the motion, and above ``MOTION_BITS`` those of the sensor.
+    of_motion, of_sensor : int
+        Bits of the effects that the model has (``assembly.active`` and ``active_sensors``).
     springs : iterable of int
         Codes of the strain energies that the model has.
 
@@ -53,7 +51,7 @@ def gathered(
     InputError
         If the source of a function cannot be read.
     """
-    gatherer = _Gatherer(bits, frozenset(springs))
+    gatherer = _Gatherer(of_motion, of_sensor, frozenset(springs))
     found = [_plain(root) for root in roots]
     for function in found:
         gatherer.take(function)
@@ -69,8 +67,8 @@ def _plain(thing: Any) -> Any:
 class _Gatherer:
     """Objects that were found, each after those that it uses, and their names in the file."""
 
-    def __init__(self, bits: int, springs: frozenset[int]) -> None:
-        self.bits, self.springs = bits, springs
+    def __init__(self, of_motion: int, of_sensor: int, springs: frozenset[int]) -> None:
+        self.of_motion, self.of_sensor, self.springs = of_motion, of_sensor, springs
         self.names: dict[int, str] = {}
         self._objects: dict[int, tuple[str, Any]] = {}
         self._trees: dict[int, ast.AST] = {}
@@ -103,8 +101,7 @@ class _Gatherer:
         tree: ast.AST = _Bare().visit(ast.parse(source)).body[0]
         if thing.__module__.endswith("assembled_hooks"):
             sensor = thing.__name__ in ("sense", "active_sensors")
-            of_sensor, of_motion = divmod(self.bits, 1 << MOTION_BITS)
-            tree = _Pruned(of_sensor if sensor else of_motion).visit(tree)
+            tree = _Pruned(self.of_sensor if sensor else self.of_motion).visit(tree)
         if thing.__module__.endswith("assembled_laws"):
             tree = _OfSprings(self.springs).visit(tree)
         return ast.fix_missing_locations(tree)

@@ -37,7 +37,7 @@ from dearig.model.film.network import HEAD
 from dearig.model.film.sensor import at_sensor
 from dearig.model.simulation.actuator import STATUS_WORDS, Actuator, ends_of
 from dearig.model.simulation.film_kernel import add_effects, drive_by_stretch
-from dearig.report.model_export.gather import MOTION_BITS, gathered
+from dearig.report.model_export.gather import gathered
 
 __all__ = ["python_file"]
 
@@ -160,13 +160,12 @@ def python_file(given: ModelFile, version: str) -> str:
     model = given.model
     c = model.coefficients()
     codes = {int(k) for k in c[HEAD + KIND :: WIDTH]}
-    sensing = int(assembly.active_sensors(c)) if isinstance(model, Actuator) else 0
-    bits = int(assembly.active(c)) | sensing << MOTION_BITS
+    acting = int(assembly.active(c))
     if isinstance(model, Actuator):
         roots = (
             kernel.rest_stretch, ends_of, kernel.drive_by_voltage, at_sensor, kernel.read_sensor,
         )  # fmt: skip
-        source, names = gathered(roots, bits, codes)
+        source, names = gathered(roots, acting, int(assembly.active_sensors(c)), codes)
         motion = 2 + len(model.network.branches)
         simulate = _ACTUATOR.format(
             **{f.__name__: names[f.__name__] for f in roots if f.__name__ in names},
@@ -176,7 +175,7 @@ def python_file(given: ModelFile, version: str) -> str:
         )  # fmt: skip
         what = "simulate(time, voltage) is the displacement of the film under a voltage."
     else:
-        source, names = gathered((drive_by_stretch, add_effects), bits, codes)
+        source, names = gathered((drive_by_stretch, add_effects), acting, 0, codes)
         simulate = _FILM.format(
             drive=names["drive_by_stretch"], effects=names["add_effects"], ok=kernel.OK,
             at_rest=REST, springs=1 + len(model.network.branches), first=HEAD + MODULUS,

@@ -13,14 +13,14 @@ import numpy as np
 
 from dearig.model.compiled.jit import jit
 
-__all__ = ["CROWDED", "HOPS", "REMEMBERED", "behind", "conductivity", "dropped"]
+__all__ = ["CROWDED", "HOPS", "REFERENCE", "REMEMBERED", "behind", "conductivity", "dropped"]
 
 #: Values of the exponent that name a law: hopping conduction, space-charge-limited current.
 HOPS, CROWDED = 0.0, -1.0
 #: Numbers of internal state of ``behind``.
 REMEMBERED = 4
 
-_REFERENCE = 8e3  # V over the unstretched film
+REFERENCE = 8e3  #: V over the unstretched film, whose field is 1
 _TOLERANCE = 1e-4  # of the voltage, the last of Newton's steps: what is left is its square
 _ITERATIONS = 30
 
@@ -55,7 +55,7 @@ def _reached(
         return 0.0, 1.0
     v, follows = guess, 1.0
     for _ in range(_ITERATIONS):
-        conducts, grows = conductivity(growth, exponent, v * lam / _REFERENCE)
+        conducts, grows = conductivity(growth, exponent, v * lam / REFERENCE)
         drop = ratio * conducts
         slope = 1.0 + drop * (1.0 + grows)
         change = (v * (1.0 + drop) - supplied) / slope

@@ -12,13 +12,18 @@ from dataclasses import replace
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Law, Parameter
 from dearig.model.effects.library.electric.space_charge_leakage import EFFECT as STEADY
-from dearig.model.effects.shared.conduction import CROWDED, REMEMBERED, behind, dropped
+from dearig.model.effects.shared.conduction import (
+    CROWDED,
+    REFERENCE,
+    REMEMBERED,
+    behind,
+    dropped,
+)
 from dearig.model.effects.shared.filters import lagged
 
 __all__ = ["EFFECT", "drop", "supply"]
 
 _LAGS, _RATIO = 3, 10.0
-_REFERENCE = 8e3  # V
 
 EFFECT = replace(
     STEADY,
@@ -75,7 +80,7 @@ def supply(c, k, m, j, t, start, end, h, lam, rate):
         shares += share
         share *= less
         late *= _RATIO
-    eased = max(1.0 + c[k + 2] * fading / (_REFERENCE * shares), 0.0) * lam ** (c[k + 1] + 2.0)
+    eased = max(1.0 + c[k + 2] * fading / (REFERENCE * shares), 0.0) * lam ** (c[k + 1] + 2.0)
     return behind(m, j, c[k], c[k + 1], CROWDED, start, end, h, lam, eased)
 
 
