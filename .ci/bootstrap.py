@@ -94,14 +94,27 @@ def _install_packages(packages: list[str], why: str) -> None:
     subprocess.run([*become, apt, "install", "-y", "-qq", *packages], check=True, env=environment)
 
 
-def run(arguments: list[str], *, quiet: bool = False, **environment: str) -> int:
-    """Run a command in the project's folder and return its exit code; errors alone if ``quiet``."""
+def start(
+    arguments: list[str], *, quiet: bool = False, **environment: str
+) -> subprocess.Popen[bytes]:
+    """Start a command in the project's folder; it says nothing but errors if ``quiet``."""
     # modules are compiled when they are first imported, and only then
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "", **environment}
+    out = subprocess.DEVNULL if quiet else None
+    return subprocess.Popen(arguments, cwd=ROOT, env=environment, stdout=out)
+
+
+def wait(*commands: subprocess.Popen[bytes]) -> int:
+    """Return the first exit code of ``commands`` that is not 0; ctrl-C ends them all."""
     try:
-        out = subprocess.DEVNULL if quiet else None
-        return subprocess.run(
-            arguments, cwd=ROOT, check=False, env=environment, stdout=out
-        ).returncode
+        return next(filter(None, [command.wait() for command in commands]), 0)
     except KeyboardInterrupt:
+        for command in commands:
+            command.kill()
+            command.wait()
         return 130
+
+
+def run(arguments: list[str], **environment: str) -> int:
+    """Run a command in the project's folder and return its exit code."""
+    return wait(start(arguments, **environment))

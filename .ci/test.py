@@ -1,10 +1,9 @@
 """Run all tests from a fresh checkout; installs what they need first."""
 
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from bootstrap import prepare, prepare_screen, run
+from bootstrap import prepare, prepare_screen, run, start, wait
 
 # two processes that find no kernels would compile them twice
 RUNS = "from dearig.acquisition.warm_up import compile_kernels; compile_kernels()"
@@ -24,9 +23,7 @@ def compile_all(python: Path) -> int:
     if not run([str(python), "-c", COLD]):
         return 0
     print("Compiling the numerical kernels, once for these sources ...", flush=True)
-    with ThreadPoolExecutor() as both:
-        ended = both.map(lambda code: run([str(python), "-c", code], quiet=True), (RUNS, FITS))
-    return next(filter(None, ended), 0)  # that of a process ended by a signal is negative
+    return wait(*(start([str(python), "-c", code], quiet=True) for code in (RUNS, FITS)))
 
 
 def test(python: Path, *arguments: str) -> int:
