@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from dearig.recording import open_recording
+from tests.deep import mostly_deep
 from tests.test_revision import git
 from tests.tools.command import LOBE, SLOW_RIG, write
 
@@ -122,6 +123,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.deep
 def test_the_installed_program_names_the_revision_of_its_build(
     installed: Path, folder: Path
 ) -> None:
@@ -177,7 +179,7 @@ def test_the_guide_of_the_installed_window_has_its_pictures(installed: Path, fol
     assert smallest > 300
 
 
-@pytest.mark.parametrize("way", ["command", "python -m"])
+@pytest.mark.parametrize("way", mostly_deep(["command", "python -m"], ["command"]))
 def test_it_records_beside_files_named_after_modules(
     installed: Path, folder: Path, way: str
 ) -> None:
@@ -193,6 +195,7 @@ def test_it_records_beside_files_named_after_modules(
     assert recording.samples == 301
 
 
+@pytest.mark.deep
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # the simulated card may have to compile its kernels first
 def test_it_records_from_a_card_with_its_guardian_beside_such_files(

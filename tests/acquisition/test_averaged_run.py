@@ -204,6 +204,7 @@ def address_of(card: Served) -> str:
     return f"daqmx:Dev1@127.0.0.1:{card.server.port}"
 
 
+@pytest.mark.deep
 def test_a_card_plays_and_records_means(tmp_path: Path) -> None:
     card = CardSettings(sample_rate_Hz=ROW_RATE, average=N, i_have_no_watchdog=True, **QUICK)
     rig_file = AVERAGED.model_copy(

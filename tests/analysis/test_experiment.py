@@ -137,12 +137,14 @@ def test_it_trips_no_interlock_of_its_own(most):
     assert max(each.max() for each in moved) < 0.75e-3 * most
 
 
+@pytest.mark.deep
 def test_where_interlocks_would_end_everything_it_says_so():
     found, words = separating_experiment(RIVALS, with_interlocks(displacement_max_mm=1e-3), NOISE)
     assert found is None
     assert "can be played: each would break a limit or trip" in words
 
 
+@pytest.mark.deep
 def test_it_is_no_faster_than_the_laser_can_tell():
     # a laser that looks every 0.2 ms, whenever that is
     laser = RigFile().laser.model_copy(update={"sampling_us": 200.0})

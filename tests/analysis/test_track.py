@@ -78,6 +78,7 @@ def learned(tmp_path_factory):
     )
 
 
+@pytest.mark.deep
 def test_a_model_that_predicts_worse_than_the_compared_one_is_not_followed(tmp_path):
     _, right, first = followed(tmp_path / "out", WRONG, compare=MODEL).runs
     assert right.kind == "thesis"
@@ -140,6 +141,7 @@ RINGING = ModelFile(
 )
 
 
+@pytest.mark.deep
 def test_where_a_model_stands_in_the_way_the_compared_one_learns(tmp_path):
     found = followed(tmp_path / "out", RINGING, compare=WRONG, iterations=5)
     ours = [run for run in found.runs if run.kind in ("model", "learned")]

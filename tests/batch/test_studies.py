@@ -165,6 +165,7 @@ def test_a_lost_cluster_leaves_the_rest_to_this_computer(
     assert table.table.read_bytes() == whole.table.read_bytes()
 
 
+@pytest.mark.deep
 @pytest.mark.filterwarnings("ignore")
 def test_dask_gives_the_same_table(shelf: Path, options: StudyOptions, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason='takes the extra "cluster"')

@@ -117,6 +117,7 @@ def test_wrong_usage_is_one_line(arguments: list[str], message: str) -> None:
     assert "Value error" not in answer.err
 
 
+@pytest.mark.deep
 def test_a_reader_who_leaves_a_pipe_is_no_error(lobe: Path) -> None:
     # big enough for no buffer, so that the pipe breaks while it is written to
     read, wrote = os.pipe()
@@ -157,6 +158,7 @@ def test_verbose_tells_of_events_on_standard_error(tmp_path: Path) -> None:
     assert "numba" not in ended.stderr
 
 
+@pytest.mark.deep
 def test_results_fit_80_columns_and_pipes_get_no_bars(identified: tuple[Path, dict]) -> None:
     model, _ = identified
     ended = run(
@@ -454,6 +456,7 @@ def test_film_data_from_import_to_validation(tmp_path: Path) -> None:
     assert out.read_text(encoding="utf-8").splitlines()[0] == "time_s,stretch,nominal_stress_kPa"
 
 
+@pytest.mark.deep
 def test_measured_film_data(tmp_path: Path) -> None:
     folder = measured_data()
     specimen = ("--gauge-length-mm", "80", "--area-mm2", "22")

@@ -135,6 +135,7 @@ class TestRecordWithAModel:
 
 
 class TestSearch:
+    @pytest.mark.deep
     @pytest.mark.slow
     def test_the_hidden_effect_is_found_and_proved_on_untouched_recordings(self, diagnosed, bench):
         assert diagnosed["verdict"] == "explained"
@@ -149,6 +150,7 @@ class TestSearch:
         assert diagnosed["records"]["train"] == ["thesis"]
         check(bench / "report.html")
 
+    @pytest.mark.deep
     @pytest.mark.slow
     def test_the_better_model_goes_through_everything(self, diagnosed, bench, tmp_path):
         model = load_model(bench / "better.toml")

@@ -41,6 +41,7 @@ def test_options_name_every_energy() -> None:
     assert get_args(SpringChoice) == (*get_args(SpringKind), "choose")
 
 
+@pytest.mark.deep
 def test_the_energy_that_made_the_data_is_kept(pulls: Path, tmp_path: Path) -> None:
     model, report, out = (tmp_path / name for name in ("m.toml", "report.html", "out.json"))
     answer = done(

@@ -30,6 +30,7 @@ from dearig.docs import pages
 from dearig.docs.site import anchors
 from dearig.model.film.material import Branch, Network, Spring
 from dearig.model.simulation.strip import Strip
+from tests.deep import mostly_deep
 from tests.docs import reference
 from tests.docs.markdown import (
     ROOT,
@@ -193,7 +194,13 @@ def accept_toml(text: str, folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", [p for p in RUN if any(b.language == "sh" for b in blocks(p))])
+@pytest.mark.parametrize(
+    "path",
+    mostly_deep(
+        [p for p in RUN if any(b.language == "sh" for b in blocks(p))],
+        ["README.md", "app/docs/tutorial.md"],
+    ),
+)
 def test_commands_run_in_the_order_shown(
     path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -206,7 +213,13 @@ def test_commands_run_in_the_order_shown(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", [p for p in RUN if any(b.language == "python" for b in blocks(p))])
+@pytest.mark.parametrize(
+    "path",
+    mostly_deep(
+        [p for p in RUN if any(b.language == "python" for b in blocks(p))],
+        ["app/docs/how-to/notebook.md"],
+    ),
+)
 def test_python_examples_run(path: str, tmp_path: Path) -> None:
     code = "\n".join(b.text for b in blocks(path) if b.language == "python" and not b.reason)
     ran = subprocess.run(

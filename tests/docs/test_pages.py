@@ -134,6 +134,7 @@ def test_docs_writes_the_pages_and_says_where(tmp_path: Path) -> None:
     assert "hardware interlock" in opened.read_text(encoding="utf-8")
 
 
+@pytest.mark.deep
 def test_docs_opens_the_first_page_in_the_browser(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

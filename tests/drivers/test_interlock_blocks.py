@@ -66,6 +66,7 @@ def spoilt(faults, **locks) -> Signals:
     return signals
 
 
+@pytest.mark.deep
 @examples(60, suite=20)
 @given(
     faults=st.lists(SPOILT, max_size=5),

@@ -207,6 +207,7 @@ def test_a_value_that_this_version_cannot_show_is_told(tmp_path: Path) -> None:
 # ---------------------------------------------------------------- figures
 
 
+@pytest.mark.deep
 def test_figures_for_print(tmp_path: Path) -> None:
     train = actuator_comparison(origin=SIMULATED)
     report = tmp_path / "report.html"

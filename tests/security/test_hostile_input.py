@@ -72,6 +72,7 @@ DEEP = {
     "instruments by the thousand", "fraction of 1 MB", "an effect of 100,000 values",
     "100,000 keys", "a table of 100,000 tables", "CSV with a wrong last line",
     "MAT that unpacks to 2 GB", "thesis of 100,000 lobes", "100,000 tables in one line",
+    "dataset that unpacks to 16 GB", "title of 50 MB", "10,000 branches", "history of 9,000 tables",
 }  # fmt: skip
 
 

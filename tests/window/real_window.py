@@ -16,6 +16,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QEventLoop, QPoint, QSettin
 from PySide6.QtWidgets import QApplication, QWidget
 
 from dearig.window.kit.theme import LIGHT, prepare_plots
+from dearig.window.run.controls import StepButton
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 
@@ -102,6 +103,25 @@ def until(condition: Callable[[], bool], what: str) -> None:
         raise SystemExit(f"waited in vain: {what}{said}")
 
 
+def press(hand: Hand, step: StepButton, done: Callable[[], bool], what: str) -> None:
+    """Click a step towards voltage, once more where the window says that it was busy."""
+    dropped: list[str] = []
+    step.dropped.connect(dropped.append)
+    while not done():
+        dropped.clear()
+        until(lambda: done() or (step.isEnabled() and step.answers), f"{what}: {step.text()}")
+        if not done():
+            hand.click(pixel(step, step.rect().center()))
+            until(lambda: done() or bool(dropped), what)
+    step.dropped.disconnect(dropped.append)
+
+
+def pixel(widget: QWidget, at: QPoint) -> QPoint:
+    """Pixel of the screen at a place of ``widget``; a scaled screen has more of them."""
+    place, scale = widget.mapToGlobal(at), widget.devicePixelRatioF()
+    return QPoint(round(place.x() * scale), round(place.y() * scale))
+
+
 def end(window: MainWindow) -> None:
     """Close ``window`` and destroy it while Python's objects are whole, as the program does."""
     window.close()
@@ -120,7 +140,7 @@ def main() -> None:
     saw: dict[str, object] = {"platform": application.platformName()}
 
     def click(widget: QWidget) -> None:
-        hand.click(widget.mapToGlobal(widget.rect().center()))
+        hand.click(pixel(widget, widget.rect().center()))
 
     until(window.isActiveWindow, "the window becomes active")
     until(lambda: page.arm_button.isEnabled() and page.arm_button.answers, "a plan")
@@ -136,13 +156,10 @@ def main() -> None:
     until(lambda: page.operator.text() == "ada", "the operator's name")
     saw["operator"] = session.operator
     saw["planned"] = page.display.view.words.text()
-    # a click while the window makes a page is dropped, as one that could not be answered
-    until(lambda: window.idle_pages.done and page.arm_button.answers, "all pages")
-    click(page.arm_button)
-    until(page.start_button.isEnabled, "armed")
+    until(lambda: window.idle_pages.done, "all pages")
+    press(hand, page.arm_button, page.start_button.isEnabled, "armed")
     saw["armed"] = window.bar.badge.state.name
-    click(page.start_button)
-    until(lambda: page.runner.running, "started")
+    press(hand, page.start_button, lambda: page.runner.running, "started")
     saw["started"] = window.bar.badge.state.name
 
     def seconds() -> float:
@@ -167,11 +184,9 @@ def main() -> None:
     saw["ended"] = window.bar.badge.state.name
     saw["result"] = page.result.text()
     # and once more, stopped with the mouse
-    until(lambda: page.arm_button.isEnabled() and page.arm_button.answers, "a plan again")
-    click(page.arm_button)
-    until(page.start_button.isEnabled, "armed again")
-    click(page.start_button)
-    until(lambda: page.runner.running and seconds() > 0.0, "started again")
+    press(hand, page.arm_button, page.start_button.isEnabled, "armed again")
+    press(hand, page.start_button, lambda: page.runner.running, "started again")
+    until(lambda: seconds() > 0.0, "samples again")
     click(page.stop_button)
     until(lambda: not page.runner.running, "stopped by the mouse")
     saw["recordings"] = sorted(path.name for path in folder.glob("*.h5"))

@@ -22,7 +22,7 @@ from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
 from tests.window.conftest import SHORT
-from tests.window.real_window import Hand, end, until
+from tests.window.real_window import Hand, end, pixel, press, until
 
 LONG = SHORT.replace("lead_in_s = 0.3", "lead_in_s = 1.0").replace(
     "frequency_Hz = 2.0", "frequency_Hz = 0.1"
@@ -67,26 +67,16 @@ class Story:
         until(self.window.isActiveWindow, "the window becomes active")
 
     def click(self, widget: QWidget) -> None:
-        self.hand.click(self.pixel(widget, widget.rect().center()))
-
-    def pixel(self, widget: QWidget, at: QPoint) -> QPoint:
-        """Pixel of the screen at a place of ``widget``; a scaled screen has more of them."""
-        place, scale = widget.mapToGlobal(at), widget.devicePixelRatioF()
-        return QPoint(round(place.x() * scale), round(place.y() * scale))
+        self.hand.click(pixel(widget, widget.rect().center()))
 
     def arm(self) -> None:
         self.window.show_page(self.page)
-        arm = self.page.arm_button
-        until(lambda: arm.isEnabled() and arm.answers, "a plan")
-        self.click(arm)
-        until(lambda: self.runner.armed, "armed")
+        press(self.hand, self.page.arm_button, lambda: self.runner.armed, "armed")
 
     def start(self) -> None:
         self.arm()
-        start = self.page.start_button
-        until(lambda: start.isEnabled() and start.answers, "ARMED was seen")
-        self.click(start)
-        until(lambda: self.seconds() > 0.0, "started")
+        press(self.hand, self.page.start_button, lambda: self.runner.running, "started")
+        until(lambda: self.seconds() > 0.0, "samples")
 
     def seconds(self) -> float:
         now = None if self.page.live is None else self.page.live.now()
@@ -100,7 +90,7 @@ class Story:
         """Colour of a corner of ``widget`` on the screen; the picture is kept as ``name``."""
         screen = self.application.primaryScreen().grabWindow(0).toImage()
         screen.save(str(self.folder / f"{name}.png"))
-        return str(screen.pixelColor(self.pixel(widget, QPoint(12, 10))).name())
+        return str(screen.pixelColor(pixel(widget, QPoint(12, 10))).name())
 
 
 def on_a_simulated_rig(story: Story) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from dearig.recording import open_recording
+from tests.deep import mostly_deep
 
 
 def gui(*arguments: object, code: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
@@ -38,14 +39,20 @@ def test_without_a_screen_it_says_so() -> None:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have a screen")
 @pytest.mark.parametrize(
     ("environment", "words"),
-    [
-        ({"DISPLAY": ":59077"}, "the screen :59077 cannot be used: "),
-        (
-            {"DISPLAY": ":59077", "WAYLAND_DISPLAY": "wayland-77"},
-            "screen wayland-77 or :59077 cannot be",
-        ),
-        ({"QT_QPA_PLATFORM": "nonsense"}, 'Could not find the Qt platform plugin "nonsense"'),
-    ],
+    mostly_deep(
+        [
+            pytest.param({"DISPLAY": ":59077"}, "the screen :59077 cannot be used: ", id="X11"),
+            pytest.param(
+                {"DISPLAY": ":59077", "WAYLAND_DISPLAY": "wayland-77"},
+                "screen wayland-77 or :59077 cannot be",
+            ),
+            pytest.param(
+                {"QT_QPA_PLATFORM": "nonsense"},
+                'Could not find the Qt platform plugin "nonsense"',
+            ),
+        ],
+        ["X11"],
+    ),
 )
 def test_a_screen_that_is_not_there_is_told(environment: dict[str, str], words: str) -> None:
     done = gui(**environment)

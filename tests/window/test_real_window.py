@@ -45,6 +45,7 @@ def display() -> Iterator[str]:
         server.wait()
 
 
+@pytest.mark.deep
 def test_a_run_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
     # one unreadable file raised errors in slots, on standard error, with every new recording
     (tmp_path / "letter.h5").write_text("dear reader")

@@ -148,6 +148,7 @@ def test_holding_the_voltage_changes_the_drive_alone(folder):
     assert held.recording.sha256 == readings.recording.sha256
 
 
+@pytest.mark.deep
 @pytest.mark.usefixtures("searched")
 def test_a_model_carries_that_its_voltage_was_taken_as_held(folder, tmp_path):
     out = tmp_path / "held.toml"

@@ -107,6 +107,7 @@ def test_late_read_is_no_dead_guardian(bench):
     beat_for(bench, 20, interval=30.0)
 
 
+@pytest.mark.deep
 def test_half_an_hour_of_beats_passes_and_nothing_grows(bench):
     guardian = psutil.Process(bench.guardian.pid)
     bench.guardian.arm()
@@ -169,6 +170,7 @@ def test_guardian_of_other_sources_is_refused(bench, monkeypatch):
         Bench(bench.card)
 
 
+@pytest.mark.deep
 def test_guardian_of_another_version_is_refused(bench, monkeypatch):
     monkeypatch.setattr(sources, "version", lambda: "0.0.1")
     with pytest.raises(RigError, match=r"other sources than this program .version in "):

@@ -245,6 +245,7 @@ def test_check_ignores_the_proxies_of_the_environment() -> None:
 _CONNECTION = re.compile(r"sa_family=(AF_INET6?), .*?port=htons\((\d+)\).*?\"(.+?)\"")
 
 
+@pytest.mark.deep
 @pytest.mark.skipif(shutil.which("strace") is None, reason="strace is missing")
 def test_check_contacts_only_the_host_that_was_named(tmp_path: Path) -> None:
     trace = tmp_path / "trace"

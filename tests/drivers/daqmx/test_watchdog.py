@@ -9,6 +9,7 @@ from dearig.config.rigfile import RigFile, load_rig_file
 from dearig.drivers.daqmx.watchdog import WATCHDOG, watchdog_text
 from dearig.errors import InputError
 from dearig.sim_backend.daqmx.properties import attributes
+from tests.deep import mostly_deep
 from tests.tools.command import LOBE, dearig, done, refused, write
 from tests.tools.daqmx import served
 
@@ -63,11 +64,18 @@ def test_check_says_that_a_run_would_be_refused(tmp_path, rig_toml):
 @pytest.mark.usefixtures("real")
 @pytest.mark.parametrize(
     ("rig_toml", "said"),
-    [
-        (WIRED, "the card switches the amplifier off after 1 s"),
-        (WIRED + "hv_enable_watchdog_s = 2.5\n", "switches the amplifier off after 2.5 s"),
-        (DECLARED, NO_WATCHDOG),
-    ],
+    mostly_deep(
+        [
+            pytest.param(WIRED, "the card switches the amplifier off after 1 s"),
+            pytest.param(
+                WIRED + "hv_enable_watchdog_s = 2.5\n",
+                "switches the amplifier off after 2.5 s",
+                id="of the rig file",
+            ),
+            pytest.param(DECLARED, NO_WATCHDOG, id="declared"),
+        ],
+        ["of the rig file", "declared"],
+    ),
 )
 def test_the_first_line_of_a_run_on_a_card_says_what_the_watchdog_does(tmp_path, rig_toml, said):
     with served() as card:

@@ -286,6 +286,7 @@ def test_springs_fitted_beside_certain_drift_predict_other_recordings():
     assert off(found.final.predicting) < 0.3 * off(found.baseline.model)
 
 
+@pytest.mark.deep
 def test_indistinguishable_effects_are_reported_as_such():
     truth = replace(PLAIN, effects=effect("linear drag", drag=400.0))
     found = diagnose([record_of(truth)], PLAIN, workers=1)
@@ -319,6 +320,7 @@ def test_a_residual_of_no_family_is_described():
     assert any("specific to these recordings" in n for n in found.notes)
 
 
+@pytest.mark.deep
 def test_a_slack_strip_is_found():
     found = of_slack()
     require_consistent(found)
@@ -437,6 +439,7 @@ def test_progress_rises_from_0_to_1():
     assert all(stages)
 
 
+@pytest.mark.deep
 def test_the_same_records_give_the_same_answer():
     strip = replace(STRIP, effects=effect("slack", looseness=1.0))
     again = diagnose([film_record_of(strip)], STRIP, workers=2)

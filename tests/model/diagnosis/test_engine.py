@@ -119,6 +119,7 @@ def test_a_form_that_no_law_with_a_name_has_is_found_by_the_general_law() -> Non
     assert np.max(np.abs(left)) < 0.05 * np.ptp(truth.values)
 
 
+@pytest.mark.deep
 def test_a_film_driven_by_stretch_is_diagnosed_alike() -> None:
     hidden = effect("Mullins softening", softening=0.1, width=0.4)
     found = diagnose([film_record_of(replace(STRIP, effects=hidden))], STRIP, workers=1)
@@ -132,6 +133,7 @@ def test_a_search_that_is_stopped_says_so_and_never_that_nothing_is_missing() ->
     assert found.verdict == "unexplained"
 
 
+@pytest.mark.deep
 def test_a_search_without_work_left_ends_with_what_it_has() -> None:
     settings = DiagnosisSettings(effort=2e6)
     found = diagnose([record_of(plant("sensor curvature"))], PLAIN, workers=1, settings=settings)

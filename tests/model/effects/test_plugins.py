@@ -120,6 +120,7 @@ def test_effects_that_cannot_be_used_are_left_out_one_by_one(tmp_path):
     require_left_out(problems, {module: reason for module, (_, reason) in UNUSABLE.items()})
 
 
+@pytest.mark.deep
 def test_hooks_that_do_not_compile_are_told(tmp_path):
     for module, (more, _) in UNCOMPILED.items():
         source = made_effect(f"{module} drag", more=more)
@@ -137,6 +138,7 @@ def test_more_effects_than_places(tmp_path):
     assert all("there is no place for more than 62 effects" in problem for problem in problems)
 
 
+@pytest.mark.deep
 def test_the_compiled_kernels_are_those_of_this_source(tmp_path):
     source = made_effect("lab drag")
     add_distribution(tmp_path, "lab-effects", {"lab_drag": source})

@@ -161,6 +161,7 @@ def test_value_at_a_bound_is_marked_and_warned_of():
     assert f"T_1 is {AT_STATED_BOUND}: the data may ask for a value beyond it" in found.warnings
 
 
+@pytest.mark.deep
 def test_wrong_fixed_value_is_rejected_by_the_noise():
     leads = [replace_lead(record_of(Actuator(THESIS_FILM, THESIS_LOAD, TWO), seed=s)) for s in (1,)]
     base = Actuator(THESIS_FILM, THESIS_LOAD, TWO)

@@ -41,6 +41,7 @@ def test_no_part_of_a_sum_has_an_interval_without_the_truth(seed: int) -> None:
             assert e.determined == (e.name == "mu_0")
 
 
+@pytest.mark.deep
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_sum_of_two_branches_that_act_as_one_is_determined(seed: int) -> None:
     (total,) = fit_of_twins(seed).sums

@@ -30,6 +30,8 @@ SOME_EFFECTS = (
 )
 
 
+# Deep: no program calls the steps by themselves, and to compile them so takes half a minute.
+@pytest.mark.deep
 @pytest.mark.parametrize("effects", [(), SOME_EFFECTS], ids=["without", "with effects"])
 def test_small_exponential_steps_are_those_of_classical_runge_kutta(effects):
     c = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects).coefficients()
@@ -55,6 +57,7 @@ def test_small_exponential_steps_are_those_of_classical_runge_kutta(effects):
     np.testing.assert_allclose(traces[1, :3], traces[0, :3], rtol=1e-3)
 
 
+@pytest.mark.deep
 @pytest.mark.parametrize("drag", [0.0, 40.0, 2000.0])
 def test_the_method_is_of_order_four_where_the_drag_is_in_closed_form(drag):
     effects = (("linear drag", (("drag", drag * THESIS_FILM.inertia),)),) if drag else ()

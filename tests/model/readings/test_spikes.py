@@ -38,6 +38,7 @@ def test_two_spikes_near_each_other_are_found(apart, sizes) -> None:
     assert found(signal) == wanted
 
 
+@pytest.mark.deep
 def test_good_readings_are_masked_as_seldom_as_is_said() -> None:
     # 0.01 a recording: of 30 recordings, more than 2 once in 300 times
     assert sum(len(found(MOTION + noise(seed))) for seed in range(30)) <= 2

@@ -317,7 +317,7 @@ class TestOtherFigures:
         "name",
         mostly_deep(
             ["$x^2$ & co.h5", "测量-一.h5", "<script>alert(1)</script>", "long" * 40],
-            ["$x^2$ & co.h5", "long" * 40],
+            ["$x^2$ & co.h5"],
         ),
     )
     def test_any_name_can_be_drawn(self, name, tmp_path):

@@ -116,6 +116,7 @@ def test_a_film_is_computed_as_here(name: str, tmp_path: Path) -> None:
     assert agrees(found, right)
 
 
+@pytest.mark.deep
 def test_a_spring_of_each_integrator_is_computed_as_here(tmp_path: Path) -> None:
     ogden = Network(
         Spring(4.6e4, kind="ogden", shape=(1.2,)),

@@ -298,6 +298,7 @@ def test_events_that_nobody_hears_do_not_pile_up() -> None:
         assert len(card.device.due_events(there, listening)) == 10_000  # none is lost
 
 
+@pytest.mark.deep
 def test_the_card_remembers_a_bounded_past(card: Served, output: nidaqmx.Task) -> None:
     there = card.device.task(output.name)
     for place in range(100_100):

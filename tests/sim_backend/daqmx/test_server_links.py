@@ -80,9 +80,7 @@ def high(device) -> bool:
     return device.wire_voltage() == pytest.approx(5000.0, abs=0.2)
 
 
-@pytest.mark.parametrize(
-    "how", mostly_deep(["listening", "reading", "silent"], ["reading", "silent"])
-)
+@pytest.mark.parametrize("how", mostly_deep(["listening", "reading", "silent"], ["silent"]))
 def test_a_killed_client_has_its_voltage_taken_away(heard, how):
     clock = HandClock()
     link = PacedClock()
@@ -116,6 +114,7 @@ def test_a_client_that_is_halted_has_its_voltage_taken_away(heard):
         process.send_signal(signal.SIGCONT)
 
 
+@pytest.mark.deep
 def test_without_tracking_the_voltage_stays_as_on_the_real_server():
     with served(client_timeout=None) as card:
         with victim(card.server.port, "listening") as process:

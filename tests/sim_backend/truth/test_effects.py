@@ -143,6 +143,7 @@ def test_everything_at_once_is_integrated_as_well():
     assert np.abs(motion.displacement - expected).max() < 0.05e-6
 
 
+@pytest.mark.deep
 def test_its_own_steps_have_converged():
     time, voltage = lobes(1000.0, 3.0)
     for family, form in (p.values for p in ON_FILM):

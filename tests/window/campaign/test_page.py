@@ -30,6 +30,7 @@ from dearig.window.run.runner import Play, Runner
 from dearig.window.session.state import Session
 from dearig.window.session.text_file import EditedFile
 from dearig.window.shell.frame import MainWindow
+from tests.deep import mostly_deep
 from tests.window.conftest import press
 from tests.window.run.test_stories import click
 
@@ -143,6 +144,7 @@ def test_a_batch_is_foreseen_armed_and_played_as_by_the_command(
     assert page.controls.blocked.text() == "No run waits."
 
 
+@pytest.mark.deep
 def test_the_present_run_is_shown_live_on_its_page_and_on_run(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:
@@ -280,11 +282,16 @@ def test_stop_ends_run_and_campaign_at_zero_and_it_goes_on_later(
 
 @pytest.mark.parametrize(
     ("entries", "state", "words"),
-    [
-        (3, "cut off", "ended during run few-0001. When the campaign is started again"),
-        (4, "cut off", "ended after run few-0001, before its results were noted"),
-        (5, "done", "ended between two runs"),
-    ],
+    mostly_deep(
+        [
+            pytest.param(
+                3, "cut off", "ended during run few-0001. When the campaign is started again"
+            ),
+            pytest.param(4, "cut off", "ended after run few-0001, before its results were noted"),
+            pytest.param(5, "done", "ended between two runs", id="between"),
+        ],
+        ["between"],
+    ),
 )
 def test_a_killed_campaign_says_what_happened_and_what_its_start_does(
     qtbot: QtBot, page: CampaignPage, runner: Runner, entries: int, state: str, words: str

@@ -34,7 +34,7 @@ def opened() -> QDialog | None:
     return next((w for w in shown if w.isVisible()), None)
 
 
-@pytest.mark.parametrize("kind", mostly_deep(KINDS, ["save_as", "ask", "ask_text"]))
+@pytest.mark.parametrize("kind", mostly_deep(KINDS, ["save_as"]))
 def test_stop_works_beside_an_open_dialog(
     qtbot: QtBot, quick_ramp: Session, window: MainWindow, kind: str
 ) -> None:

@@ -75,6 +75,7 @@ def test_a_signal_keeps_unsaved_work_for_the_next_start(
     assert len(list(unsaved_folder(session).glob("*.json"))) == 1  # its own
 
 
+@pytest.mark.deep
 def test_the_work_of_a_window_that_is_open_is_not_offered(
     window: MainWindow, answers: Answers
 ) -> None:

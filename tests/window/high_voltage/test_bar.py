@@ -267,6 +267,7 @@ def test_the_bar_is_inside_the_smallest_screen(qtbot: QtBot, window: MainWindow)
     window.run_page.runner.status.run_ended(None)
 
 
+@pytest.mark.deep
 def test_words_on_the_badge_fit(qtbot: QtBot, window: MainWindow) -> None:
     """Every state is written whole: its letters become smaller where they would be cut."""
     badge = window.bar.badge

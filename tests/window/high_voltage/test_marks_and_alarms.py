@@ -75,6 +75,7 @@ def test_m_sets_a_mark_and_the_field_takes_its_note(
     assert not bar.button.isEnabled()
 
 
+@pytest.mark.deep
 def test_m_marks_from_every_page_and_the_button_does_the_same(
     qtbot: QtBot, window: MainWindow, going: RunPage
 ) -> None:
@@ -101,6 +102,7 @@ def test_a_note_without_a_mark_sets_one_and_text_fields_keep_their_letters(
     assert [m.note for m in marks_of(qtbot, going)] == ["lamp on"]
 
 
+@pytest.mark.deep
 def test_a_note_that_is_not_finished_when_the_run_ends_is_kept(
     qtbot: QtBot, window: MainWindow, going: RunPage
 ) -> None:

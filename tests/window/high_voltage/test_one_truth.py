@@ -54,6 +54,7 @@ def test_another_rig_has_no_number_of_the_one_before(
         qtbot.wait(150)  # longer than the readouts take to be shown again
 
 
+@pytest.mark.deep
 def test_another_rig_file_has_none_either(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:
@@ -150,6 +151,7 @@ def test_the_number_at_rest_is_the_one_that_confirmed_zero_volts(
     assert page.controls.of_sample.text() == f"monitor at {clock}"
 
 
+@pytest.mark.deep
 def test_no_number_of_the_last_run_stands_under_the_next_one(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:

@@ -141,6 +141,7 @@ def test_a_space_writes_where_a_text_field_has_the_focus(
     qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)
 
 
+@pytest.mark.deep
 def test_a_space_does_not_write_where_nothing_can_be_written(
     qtbot: QtBot, window: MainWindow
 ) -> None:
@@ -197,6 +198,7 @@ def test_esc_closes_what_is_open_before_it_stops(
     assert "stopped by key Esc on Recordings, " in window.bar.detail.text()
 
 
+@pytest.mark.deep
 def test_a_field_takes_spaces_while_nothing_is_armed(qtbot: QtBot, window: MainWindow) -> None:
     page = window.run_page
     strike(page.operator, *"a b")

@@ -206,6 +206,7 @@ def test_every_bad_file_has_one_row_with_words(
     running.discard()
 
 
+@pytest.mark.deep
 def test_an_interrupt_that_comes_too_late_does_not_stop_the_reading(
     session: Session, shelf: Path, qtbot: QtBot
 ) -> None:
@@ -219,6 +220,7 @@ def test_an_interrupt_that_comes_too_late_does_not_stop_the_reading(
     library.close()
 
 
+@pytest.mark.deep
 def test_tags_are_given_to_several_and_kept_beside_the_recordings(
     session: Session, shelf: Path, keep: Keep, qtbot: QtBot
 ) -> None:

@@ -17,6 +17,7 @@ from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.run.page import RunPage
 from dearig.window.sequence.planner import make_preview
 from dearig.window.session.state import Session
+from tests.deep import mostly_deep
 from tests.window.conftest import SHORT, press
 from tests.window.run.test_stories import RUN_MS, click, play, seconds
 
@@ -55,7 +56,7 @@ def test_before_a_run_the_plots_show_what_will_be_played(
     assert drawn(run_page, "planned voltage").max() == pytest.approx(2.5, abs=0.01)
 
 
-@pytest.mark.parametrize("change", ["sequence", "rig file", "film"])
+@pytest.mark.parametrize("change", mostly_deep(["sequence", "rig file", "film"], ["rig file"]))
 def test_a_change_of_anything_that_is_played_removes_the_last_run_at_once(
     change: str, qtbot: QtBot, run_page: RunPage, plan_of: Callable[[str], None]
 ) -> None:
@@ -120,6 +121,7 @@ def test_a_refused_plan_is_drawn_and_said_to_be_refused(
     assert run_page.display.digest == ""
 
 
+@pytest.mark.deep
 def test_current_and_trip_levels_of_the_rig_file_are_drawn(
     qtbot: QtBot, run_page: RunPage, plan_of: Callable[[str], None]
 ) -> None:
@@ -181,6 +183,7 @@ def test_plots_can_be_hidden_and_stay_so(qtbot: QtBot, run_page: RunPage, sessio
     assert actions["residual"].isChecked()
 
 
+@pytest.mark.deep
 def test_scrolling_back_holds_the_plots_while_the_run_goes_on(
     qtbot: QtBot, run_page: RunPage, plan_of: Callable[[str], None]
 ) -> None:

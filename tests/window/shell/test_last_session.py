@@ -164,6 +164,7 @@ def test_damaged_settings_stop_no_start(ini: Path, tmp_path: Path, content: str)
     assert session.overlay_drive == "command"
 
 
+@pytest.mark.deep
 def test_the_rig_file_comes_back_and_is_named(ini: Path, tmp_path: Path, qtbot: QtBot) -> None:
     file = tmp_path / "lab.toml"
     file.write_text("[limits]\nvoltage_max_kV = 4.5\n")

@@ -21,6 +21,7 @@ from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
+from tests.deep import mostly_deep
 from tests.window.conftest import SHORT, press
 from tests.window.made_recordings import made
 from tests.window.shown_text import (
@@ -107,6 +108,7 @@ def test_nothing_is_cut_or_covered_on_any_page_at_three_sizes(
     assert sorted(set(found)) == [], "\n" + "\n".join(sorted(set(found)))
 
 
+@pytest.mark.deep
 def test_nothing_is_cut_while_work_goes_on(
     qtbot: QtBot, window: MainWindow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,7 +169,7 @@ def places(window: MainWindow) -> list[QRect]:
     ]
 
 
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("size", mostly_deep(SIZES, SIZES[:1]))
 def test_what_comes_and_goes_does_not_move_stop(
     qtbot: QtBot, window: MainWindow, size: tuple[int, int]
 ) -> None:

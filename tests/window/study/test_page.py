@@ -178,6 +178,7 @@ def test_a_study_is_reopened_and_the_old_result_is_labelled(session, keep, qtbot
     assert page.headline.text().startswith("Previous result: ")
 
 
+@pytest.mark.deep
 def test_a_recording_that_ended_in_an_arc_is_marked_and_warned_of(session, keep, qtbot):
     arc = session.folder / "arc.h5"
     loaded = parse_sequence(LOBES.format(top=6.0), "arc", Path())
