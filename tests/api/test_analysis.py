@@ -94,6 +94,7 @@ class TestIdentify:
 
 
 class TestValidate:
+    @pytest.mark.deep
     def test_a_model_a_result_or_a_file_is_compared(self, run, fit, tmp_path: Path) -> None:
         other = dearig.record("validation-a-1.0", seed=2, rig_file=SLOW_RIG)
         path = fit.save(tmp_path / "m.toml")

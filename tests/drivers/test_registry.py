@@ -135,6 +135,7 @@ def test_what_cannot_be_used_is_left_out_with_a_sentence(installed):
     assert "is no driver: it needs a role" in found["camera"]
 
 
+@pytest.mark.deep
 def test_a_rig_that_another_distribution_brings_records(installed, tmp_path):
     (tmp_path / "rig.toml").write_text(RIG_FILE, encoding="utf-8")
     (tmp_path / "rest.toml").write_text(SEQUENCE, encoding="utf-8")

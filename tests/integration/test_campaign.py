@@ -17,7 +17,7 @@ PATIENCE = 20.0
     mostly_deep(
         ["hold-client-killed", "client-frozen", "guardian-killed", "amplifier-trip", "disk-full",
          "operator-stops", "serial-garbage"],
-        kept=["guardian-killed", "disk-full"],
+        kept=["guardian-killed"],
     ),
 )  # fmt: skip
 def test_it_ends_at_zero_volts_with_what_was_recorded(kind, tmp_path):

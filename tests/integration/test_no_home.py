@@ -50,6 +50,7 @@ FEW = ("index .", "record lobe.toml --rig sim --out lobe.h5")
 ALL = ("info run.h5", "docs --no-browser", "validate model.toml lobe.h5 --report report.html")
 
 
+@pytest.mark.deep
 @pytest.mark.parametrize("name", mostly_deep(HOMES, ["a home that is no folder"]))
 def test_every_command_goes_on(tmp_path: Path, name: str) -> None:
     home, most = HOMES[name], name == "a home in which nothing can be made"

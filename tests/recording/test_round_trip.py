@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dearig.drivers.channels import RESERVED_NAMES
@@ -24,6 +24,7 @@ from dearig.recording import (
     open_recording,
     save_recording,
 )
+from tests.deep import examples
 from tests.tools.recordings import Clock
 
 ROWS = 40
@@ -106,7 +107,7 @@ def there_and_back(
 
 
 @pytest.mark.parametrize("to", EXPORTS)
-@settings(max_examples=25, deadline=None)
+@examples(25, 8)
 @given(
     values=st.one_of(actuators(), films()),
     events=EVENTS,

@@ -78,6 +78,7 @@ def test_without_its_packages_it_says_how_to_get_them(missing: str) -> None:
     assert "dearig[gui]" in done.stderr
 
 
+@pytest.mark.deep
 def test_a_rig_file_that_is_none_is_told_in_the_terminal(tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text("[film]\nlength_mm = -1.0\n")
     done = gui("--rig-file", tmp_path / "rig.toml", QT_QPA_PLATFORM="offscreen")

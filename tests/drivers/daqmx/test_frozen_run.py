@@ -19,6 +19,7 @@ from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.daqmx.rig import DaqmxRig
 from dearig.drivers.errors import RigError
 from dearig.drivers.rig import RigState
+from tests.deep import mostly_deep
 from tests.drivers.daqmx.test_rig import WIRED, Bench, Watcher
 
 ENABLE = "port0/line0"
@@ -117,7 +118,13 @@ def whole_run(rig: DaqmxRig, *, stopped: bool) -> None:
         drain(rig)
 
 
-@pytest.mark.parametrize("settings", [WIRED, RigFile()], ids=["enable-line", "no-enable-line"])
+@pytest.mark.parametrize(
+    "settings",
+    mostly_deep(
+        [pytest.param(WIRED, id="enable-line"), pytest.param(RigFile(), id="no-enable-line")],
+        ["enable-line"],
+    ),
+)
 def test_run_that_goes_on_after_its_guardian_acted_never_raises_a_voltage(freeze, settings):
     with guarded(freeze, settings) as bench:
         steps = set()

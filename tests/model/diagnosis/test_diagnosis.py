@@ -450,6 +450,7 @@ def test_the_same_records_give_the_same_answer():
     assert [r.chosen for r in again.rounds] == [r.chosen for r in first.rounds]
 
 
+@pytest.mark.deep
 def test_a_diagnosis_reads_no_file_and_no_clock(monkeypatch):
     expected = of_slack()
     strip = replace(STRIP, effects=effect("slack", looseness=1.0))

@@ -164,6 +164,7 @@ def test_an_effect_that_is_left_out_for_now_has_kernels_of_its_own(tmp_path):
     assert without[2] != there[2]
 
 
+@pytest.mark.deep
 def test_the_doctor_tells_which_effects_are_left_out(tmp_path):
     modules = {"lab_drag": made_effect("lab drag"), "lab_twice": made_effect("linear drag")}
     add_distribution(tmp_path, "lab-effects", modules)

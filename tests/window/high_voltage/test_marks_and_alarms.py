@@ -148,6 +148,7 @@ def test_alarms_of_a_run_have_time_level_and_acknowledgement(
     assert bar.words.full_text == ""
 
 
+@pytest.mark.deep
 def test_an_acknowledgement_during_a_run_is_recorded(qtbot: QtBot, going: RunPage) -> None:
     going.alarms.add("warning", "the room is warm", 1.0)
     going.alarms.acknowledge("Ada")

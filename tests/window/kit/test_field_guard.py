@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
 from PySide6.QtCore import QCoreApplication, QMimeData, QPoint, QPointF, Qt
 from PySide6.QtGui import QDragEnterEvent
 from PySide6.QtTest import QTest
@@ -113,6 +114,7 @@ def test_no_field_of_the_import_dialog_changes_by_the_wheel(
     worker.close()
 
 
+@pytest.mark.deep
 def test_the_page_scrolls_under_the_pointer_instead(qtbot: QtBot, window: MainWindow) -> None:
     page = window.page(RigPage)
     window.show_page(page)

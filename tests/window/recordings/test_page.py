@@ -193,6 +193,7 @@ def test_what_is_broken_is_said_and_what_can_be_mended_is_mended(session, keep, 
         assert file["entry/data/time"].size == 2000
 
 
+@pytest.mark.deep
 def test_the_list_follows_the_folder(session, folder, keep, qtbot, tmp_path):
     page = open_page(session, keep, qtbot)
     qtbot.waitUntil(lambda: not page._library._worker.busy, timeout=_PATIENCE)
@@ -240,6 +241,7 @@ def test_nothing_of_one_folder_is_said_of_the_next(session, keep, qtbot, tmp_pat
     assert page.details.item(0, 1).text().startswith("Select a recording")
 
 
+@pytest.mark.deep
 def test_what_is_being_read_says_so(session: Session, keep: Keep, qtbot: QtBot) -> None:
     made(session.folder, "first")
     page = open_page(session, keep, qtbot)

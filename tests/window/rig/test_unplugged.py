@@ -17,6 +17,7 @@ from dearig.recording import open_recording
 from dearig.sim_backend.clock import PacedClock
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.run.page import RunPage
+from tests.deep import mostly_deep
 from tests.tools.daqmx import served
 from tests.window.conftest import SHORT, press
 
@@ -63,6 +64,7 @@ def play(qtbot: QtBot, page: RunPage, port: int) -> None:
         press(qtbot, page.start_button)
 
 
+@pytest.mark.deep
 def test_a_run_on_a_card(qtbot: QtBot, run_page: RunPage) -> None:
     with served(RIG_FILE, clock=PacedClock()) as there:
         play(qtbot, run_page, there.server.port)
@@ -73,7 +75,9 @@ def test_a_run_on_a_card(qtbot: QtBot, run_page: RunPage) -> None:
     assert recording.outcome == "finished"
 
 
-@pytest.mark.parametrize("fault", ["server-gone@0.5", "server-frozen@0.5"])
+@pytest.mark.parametrize(
+    "fault", mostly_deep(["server-gone@0.5", "server-frozen@0.5"], ["server-frozen@0.5"])
+)
 def test_a_rig_that_is_unplugged_in_mid_run(qtbot: QtBot, run_page: RunPage, fault: str) -> None:
     with served(RIG_FILE, clock=PacedClock(), faults=(fault,)) as there:
         play(qtbot, run_page, there.server.port)

@@ -36,6 +36,7 @@ def predicts(outline: Preview | None) -> bool:
     return outline is not None and outline.curves["displacement"][1].size > 0
 
 
+@pytest.mark.deep
 def test_an_outline_has_the_curves_of_the_plan_and_cannot_be_played(
     session: Session, planner: Planner, qtbot: QtBot
 ) -> None:

@@ -63,6 +63,7 @@ def first_start(session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     window.close()
 
 
+@pytest.mark.deep
 def test_first_start_says_what_it_does_and_leaves_the_pages_usable(first_start, qtbot: QtBot):
     window, done = first_start
     session = window.session

@@ -81,6 +81,7 @@ def test_no_page_is_left_to_be_made_once_the_rig_is_armed(
     )
 
 
+@pytest.mark.deep
 def test_an_idle_window_makes_them_all(window: MainWindow, qtbot: QtBot) -> None:
     window.idle_pages._timer.start(1)
     qtbot.waitUntil(lambda: window.idle_pages.done, timeout=WAIT)
