@@ -1,6 +1,6 @@
 """Compilation of the numerical kernels before they are needed, and a note that it was done.
 
-The kernels of a fresh installation are compiled at their first call, which takes about a minute of
+The kernels of a fresh installation are compiled at their first call, which takes two minutes of
 one processor. A program with a window does that once, in a process of its own.
 """
 

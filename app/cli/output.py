@@ -188,11 +188,11 @@ def announce_compilation() -> None:
     folder, note = cache_folder(), cache_note()
     if folder is None:
         sys.stderr.write(
-            f"Compiling the numerical kernels: this takes about a minute with every command, as "
+            f"Compiling the numerical kernels: this takes about two minutes with every command, as "
             f"there is no folder to keep them in ({note}); set NUMBA_CACHE_DIR to one.\n"
         )
         return
     if note:
         sys.stderr.write(f"The compiled kernels are kept in {folder}: {note}.\n")
     if not is_compiled():
-        sys.stderr.write("Compiling the numerical kernels, once: this takes about a minute.\n")
+        sys.stderr.write("Compiling the numerical kernels, once: this takes about two minutes.\n")
