@@ -23,7 +23,8 @@ from dearig.model.fitting.intervals import (
     natural_ends,
     profile,
 )
-from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.levenberg import LocalFit, descend
+from dearig.model.fitting.parallel import parallel_map
 from dearig.model.fitting.parameters import Estimate, FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import resolved_times
@@ -181,15 +182,17 @@ def valleys_of(best: Optimum, estimates: Sequence[Estimate]) -> Valleys | None:
     if not spare or not firm:
         return None
     alone = Valleys(best, spare, firm, {})
+
+    def followed(start: np.ndarray) -> LocalFit:
+        problem = copy(best.problem)  # counts its simulations by itself
+        return descend(problem, start, best.held, _ITERATIONS, _GAIN * best.threshold, quick=False)
+
+    starts = [start for branch in spare for start in _starts(alone, branch)]
     reached: dict[tuple[int, ...], tuple[float, np.ndarray]] = {}
-    for branch in spare:
-        for start in _starts(alone, branch):
-            fit = descend(
-                best.problem, start, best.held, _ITERATIONS, _GAIN * best.threshold, quick=False
-            )
-            chi2, sites = fit.cost * best.problem.samples, _sites(alone, fit.x)
-            if chi2 < reached.get(sites, (best.chi2 + best.threshold,))[0]:
-                reached[sites] = chi2, fit.x
+    for fit in parallel_map(followed, starts, best.problem.workers, "valley"):
+        chi2, sites = fit.cost * best.problem.samples, _sites(alone, fit.x)
+        if chi2 < reached.get(sites, (best.chi2 + best.threshold,))[0]:
+            reached[sites] = chi2, fit.x
     lowest = min(reached.values(), key=lambda r: r[0], default=(math.inf, best.x))
     if best.chi2 - lowest[0] > best.gain:
         raise BetterPoint(lowest[1], best.chi2 - lowest[0])
