@@ -18,7 +18,7 @@ LINKS = ROOT / ".links"
 
 
 def make() -> Path:
-    """Make the links anew, and return the folder to search for packages."""
+    """Make the links again, and return the folder to search for packages."""
     package = LINKS / "dearig"
     if package.exists():
         for entry in package.iterdir():

@@ -1,6 +1,6 @@
 """Check the code without running it: linter, formatter, types, layers.
 
-The Python that runs this is used. The links of .ci/links.py are made anew first: on Windows they
+The Python that runs this is used. The links of .ci/links.py are made again first: on Windows they
 are hard links where the system allows no symbolic ones, and a program that saves a file by
 replacing it leaves them stale.
 """

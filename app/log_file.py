@@ -66,7 +66,7 @@ class LogFile(RotatingFileHandler):
         self._homeless = path.parts[:1] == ("~",)
         self.setLevel(logging.INFO)
         self.setFormatter(PrintableFormatter(_FORMAT))
-        # other packages have news at this level that nobody needs
+        # other packages have news at this level that no one needs
         self.addFilter(lambda r: r.name.startswith("dearig") or r.levelno >= logging.WARNING)
 
     def emit(self, record: logging.LogRecord) -> None:

@@ -20,7 +20,7 @@ CHANNEL_NAMES = (
 #: Name of a declared channel that is the relative humidity near the film, in per cent.
 HUMIDITY = "relative_humidity"
 
-#: Endings of the names of a prediction's band beside its signal: both ends of 95 %, and the
+#: Endings of the names of a prediction's band next to its signal: both ends of 95 %, and the
 #: standard deviations of its parts.
 BAND_ENDINGS = ("low95", "high95", "sd_parameters", "sd_noise", "sd_law")
 

@@ -556,7 +556,7 @@ def open_block_gate(
     A correction is a part of the voltage, up to ``authority`` either way, and changes by at most
     ``rate_limit`` in 1/s. The feedforward with the whole authority must pass the gate too, with the
     prediction ``edge``; ``prediction`` is for the samples that are played. Raises
-    ``RefusedWaveform`` where it does not pass, and for values that are no limits.
+    ``RefusedWaveform`` where it does not pass, and for values that are not limits.
     """
     if not block >= 1:
         raise RefusedWaveform((f"a block has 1 sample or more, not {block}",))

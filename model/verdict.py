@@ -30,7 +30,7 @@ PARTLY_EXPLAINED = "partly_explained"
 NOT_CONFIRMED = "not_confirmed"
 UNEXPLAINED = "unexplained"
 
-#: How the search ended: by itself, stopped by the operator, or at its computing budget.
+#: How the search ended: on its own, stopped by the operator, or at its computing budget.
 COMPLETE = "complete"
 STOPPED = "stopped"
 BUDGET = "budget"

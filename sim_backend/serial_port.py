@@ -142,7 +142,7 @@ class _Line(_Served):
             if ready:
                 self._responder.receive(self._carried(os.read(self._line, 4096)), self._clock.now())
             data = self._carried(self._responder.due(self._clock.now()))
-            # bytes that nobody reads from a serial line are lost
+            # bytes that no one reads from a serial line are lost
             with suppress(BlockingIOError):
                 while data:
                     data = data[os.write(self._line, data) :]

@@ -40,7 +40,7 @@ def ignore_interrupts() -> None:
 
 
 def terminal_closed() -> None:
-    """End the run of this program, if there is one: nobody sees what it says any more.
+    """End the run of this program, if there is one: no one sees what it says any more.
 
     Nothing happens where the signal of a closed terminal is ignored, as under ``nohup``.
     """

@@ -90,7 +90,7 @@ def original_of(path: str | Path) -> Original:
     """Return the run of the recording at ``path``, to repeat it.
 
     The CSV file of a waveform is read from the recording's folder. Raises ``InputError`` for a file
-    that is no recording of a run, or whose sequence or rig file this version does not accept.
+    that is not a recording of a run, or whose sequence or rig file this version does not accept.
     """
     path = Path(path)
     recording = open_recording(path)

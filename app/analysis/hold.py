@@ -75,7 +75,7 @@ class HoldOptions:
 
     With a delay of 0.6 s, which ``ahead`` and the blocks of 0.1 s give, the ``response`` of 1 s has
     a gain margin of 4 and a phase margin of 69 deg. The ``rate_limit`` of 1 % per s moves the film
-    by 2 % of its displacement per s, which is slow beside its resonance.
+    by 2 % of its displacement per s, which is slow next to its resonance.
     """
 
     rise: float = 2.0

@@ -68,7 +68,7 @@ def cycles(drive: np.ndarray) -> list[tuple[int, int]]:
     """Return first and last row of each cycle of ``drive`` (n,): from one valley to the next.
 
     A rest between two cycles is divided in its middle. A part that does not come back, such as the
-    end of a run that was stopped, is no cycle, and a drive that does not vary has none.
+    end of a run that was stopped, is not a cycle, and a drive that does not vary has none.
     """
     known = _known(drive)
     span = float(np.ptp(known)) if known.size else 0.0

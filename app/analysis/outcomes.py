@@ -464,7 +464,7 @@ class DiagnoseOutcome:
         finding = self.finding
         untouched = [c.over_noise(self.noise) for c in self.after.validation]
         if finding.verdict == NOTHING_MISSING and self.prediction_errors:
-            # what the parameters' own error explains is no missing effect
+            # what the parameters' own error explains is not a missing effect
             untouched = self._within_parameters
         # of a film with the error that its model is allowed
         noise = math.sqrt(sum(s.noise**2 for s in finding.after) / len(finding.after))

@@ -61,7 +61,7 @@ def track(
     )
     if not nearest:
         check_feasible(target, tracking.inversion.unreachable, within)
-    kind_of(address)  # refuses what is no rig
+    kind_of(address)  # refuses what is not a rig
     result_folder(folder, options.overwrite)
     many = iterations + 1 + (0 if compare is None else 2)
 

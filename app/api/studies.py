@@ -109,7 +109,7 @@ class StudyResult(HasFiles, HasPage):
         """
         known = batch_trends.numbers_in(self.rows)
         if not any(isinstance(row.get(number), int | float) for row in self.rows):
-            raise InputError(f"{number!r} is no number of this study; it has {', '.join(known)}")
+            raise InputError(f"{number!r} is not a number of this study; it has {', '.join(known)}")
         return rows_figure(self.rows, number)
 
     def _writers(self) -> Writers:

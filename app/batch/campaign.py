@@ -115,7 +115,7 @@ def play_campaign(
     turn; ``SafetyStop``, ``InstrumentFault`` or ``NotSafe`` where a run ended so that a person must
     look; ``Interrupted`` where the operator ended it. The journal has it all.
     """
-    kind_of(address)  # refuses what is no rig
+    kind_of(address)  # refuses what is not a rig
     if options.actuator is not None and address != "sim":
         raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
     _check_folder(folder, resume)
@@ -511,7 +511,7 @@ class _Session:
                 InputError(reason, option=error.options, command=error.command),
             )
         self._output = error.output_state
-        # nobody was there: what kept a run from its rig would keep the next one from it too
+        # no one was there: what kept a run from its rig would keep the next one from it too
         looks = error.needs_inspection or error.output_state is None
         safe = is_safe_end(error, self._campaign.repeat_after)
         if safe and path.exists() and state.attempts <= self.queue.repeat_lost:

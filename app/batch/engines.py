@@ -43,7 +43,7 @@ _DASK_TIMEOUT = "10 s"  # to find the scheduler
 #: Times that Dask gives a task to another worker after its worker died; then it may be the cause.
 _RETRIES = 3
 _LOOK_S = 5.0  # between two looks at whether there are workers
-_NO_WORKER_S = 30.0  # without a worker after which nobody waits for one
+_NO_WORKER_S = 30.0  # without a worker after which no one waits for one
 _ANSWER_S = 30.0  # for a row that is computed to come from its worker
 #: Errors by which Dask reports that scheduler, workers or network are lost.
 _LOST_BY = (OSError, RuntimeError, TimeoutError, CancelledError, asyncio.CancelledError)
@@ -73,8 +73,8 @@ def engine_at(
     if scheme == "dask" and colon and address:
         return DaskEngine(address, work)
     raise InputError(
-        f"{where!r} is no place to compute at: write local, or dask:ADDRESS with the address of a "
-        f"Dask scheduler, such as dask:tcp://10.0.0.5:8786",
+        f"{where!r} is not a place to compute at: write local, or dask:ADDRESS with the address of "
+        f"a Dask scheduler, such as dask:tcp://10.0.0.5:8786",
         option="on",
     )
 
@@ -138,7 +138,7 @@ class LocalEngine:
             log.warning("a worker process has died; its recording is computed again")
             return list(running.values())
         except BaseException:
-            # the operator has ended the study, or its reader has: nobody waits for these
+            # the operator has ended the study, or its reader has: no one waits for these
             for child in set(multiprocessing.active_children()) - before:
                 child.terminate()
             raise

@@ -32,7 +32,7 @@ def write_extremes(recording: Path, out: Path, every: int = 0) -> int:
     A cycle goes from one valley of the commanded voltage to the next. What comes before the first
     valley belongs to the first cycle, and what comes after the last one to the last, so that no
     extreme is lost. With ``every`` the samples of cycles 1, 1 + every, 1 + 2 every, ... are written
-    to a table beside it, whose name ends in -cycles.
+    to a table next to it, whose name ends in -cycles.
 
     Returns the number of cycles. The files are on the disk when this returns. Raises
     ``InputError``.

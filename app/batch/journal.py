@@ -39,8 +39,8 @@ BYTES_MAX = 2**28
 def read_lines(path: Path, tolerant: bool = False) -> list[dict[str, Any]]:
     """Return the entries of the journal at ``path``; none where there is no file.
 
-    A last line without an end is left out. Raises ``InputError`` for a line that is no entry; with
-    ``tolerant`` its event is "".
+    A last line without an end is left out. Raises ``InputError`` for a line that is not an entry;
+    with ``tolerant`` its event is "".
     """
     if not path.exists():
         return []

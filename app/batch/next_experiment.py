@@ -93,7 +93,7 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Next
 
 
 def _least_known(trends: Sequence[Trend]) -> list[NextExperiment]:
-    """Return the effect that is seen by itself only, whose interval is widest for its size."""
+    """Return the effect that is seen on its own only, whose interval is widest for its size."""
     wide = [
         (0.5 * (effect.high - effect.low) / abs(effect.slope), trend.name, effect.column)
         for trend in trends

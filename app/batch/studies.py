@@ -60,8 +60,8 @@ class StudyTable:
 def subjects_of(sources: Sequence[Path], out: Path) -> list[Subject]:
     """Return the recordings in ``sources``: folders, lists (text, a path a line), recordings.
 
-    Of the folder of a campaign the runs to warm up are left out. What lies in ``out`` is no source.
-    Raises ``InputError`` where there is none, and for a name that occurs twice.
+    Of the folder of a campaign the runs to warm up are left out. What lies in ``out`` is not a
+    source. Raises ``InputError`` where there is none, and for a name that occurs twice.
     """
     found: list[Subject] = []
     for source in sources:

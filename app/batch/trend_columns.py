@@ -35,7 +35,7 @@ _SECONDS_A_DAY = 86400.0
 FREEDOM_MIN = 2
 _RIGS_MAX = 8  # each is a row of every number in the table, which is to be read
 #: Part of a column's variance that the columns before it explain, above which it is left out: its
-#: interval would be ten times as wide as by itself.
+#: interval would be ten times as wide as on its own.
 _CONFOUNDED = 0.99
 #: Correlation of two columns above which an experiment should separate them: there the interval of
 #: each is 1/sqrt(1 - 0.8^2) = 1.7 times as wide as without the other one.

@@ -1,4 +1,4 @@
-"""The last words of the command on a terminal: they are its own, and a closed terminal is no error.
+"""The last words of the command on a terminal: its own, and a closed terminal is not an error.
 
 Libraries write to standard error by themselves, gRPC's core for instance, also while the
 interpreter ends. An operator must find the command's sentence as the last line.

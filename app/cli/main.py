@@ -229,7 +229,7 @@ def _run(written: log_file.LogFile) -> int:
         _tell_unexpected(error, written)
         return DearigError.exit_code
     failure = output_failure()
-    # the reader of a pipe (head, less) that has seen enough is no error
+    # the reader of a pipe (head, less) that has seen enough is not an error
     if status or failure is None or isinstance(failure, BrokenPipeError):
         return status if isinstance(status, int) else 0
     _say(_exhausted(failure) or f"standard output could not be written ({failure.strerror})")

@@ -49,8 +49,8 @@ def check_files(
     """Raise ``InputError`` for an output that cannot be written, before any work is done.
 
     ``sources`` are the files that are read; they are never overwritten, even with ``force`` (the
-    name of a preset is no file and does no harm here). ``recording`` is the output that will be a
-    recording.
+    name of a preset is not a file and does no harm here). ``recording`` is the output that will be
+    a recording.
     """
     from dearig.recording.files import check_output
 

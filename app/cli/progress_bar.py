@@ -45,7 +45,7 @@ def progress(
     Gives a callback ``(stage, fraction)`` with the fraction of that stage that is done. The bar
     restarts with every stage; the elapsed time does not. With ``whole`` the fraction is of all the
     work, and a new stage only changes the bar's text. With ``computes`` the text counts the kernels
-    while any are compiled. Nothing is written where standard error is no terminal.
+    while any are compiled. Nothing is written where standard error is not a terminal.
     """
     console = PrintableConsole(stderr=True) if console is None else console
     if not console.is_terminal:

@@ -284,7 +284,7 @@ def digest_of(loaded: LoadedSequence) -> str:
 
 
 def load_campaign(path: str | Path, folder: Path | None = None) -> Campaign:
-    """Return the plan in the file ``path``; files that it names lie in ``folder``, or beside it.
+    """Return the plan in the file ``path``; files that it names lie in ``folder``, or next to it.
 
     Raises ``InputError`` with one sentence: file, key, value, and what is allowed.
     """
@@ -427,7 +427,7 @@ class _Expansion:
             yield PlannedRun(i + 1, name, sequence, MappingProxyType(values), repeat)
 
     def _read(self, sequence: str) -> str:
-        """Return the TOML of ``sequence``, a preset or a file beside the plan."""
+        """Return the TOML of ``sequence``, a preset or a file next to the plan."""
         if sequence in self._sequences:
             return self._sequences[sequence]
         if sequence in PRESETS:
@@ -437,7 +437,7 @@ class _Expansion:
             if not path.is_file():
                 near = difflib.get_close_matches(sequence, PRESETS, n=1)
                 raise InputError(
-                    f"sequence = {shown(sequence)} is neither a preset nor a file beside the plan"
+                    f"sequence = {shown(sequence)} is neither a preset nor a file next to the plan"
                     + (f" (did you mean {near[0]}?)" if near else "")
                     + f"; the presets are {', '.join(PRESETS)}"
                 )
@@ -478,7 +478,7 @@ class _Expansion:
             yield Band(found[1], found[2], limit)
 
 
-#: Numbers that each step after a run gives, beside the parameters of the model.
+#: Numbers that each step after a run gives, next to the parameters of the model.
 ERRORS = ("rms_um", "nrmse_pct", "max_um")
 
 
@@ -516,11 +516,11 @@ def _check_names(runs: list[PlannedRun]) -> None:
 
 
 def _beside(folder: Path, name: str, key: str) -> Path:
-    """Return the path of a file beside the plan. Raises ``InputError`` for one elsewhere."""
+    """Return the path of a file next to the plan. Raises ``InputError`` for one elsewhere."""
     place = PurePath(name)
     if place.is_absolute() or place.drive or ".." in place.parts:
         raise InputError(
-            f"{key} = {shown(name)} leads out of the plan's folder; put the file beside the plan, "
+            f"{key} = {shown(name)} leads out of the plan's folder; put the file next to the plan, "
             f"and name it without a path"
         )
     path = folder / place
@@ -529,11 +529,11 @@ def _beside(folder: Path, name: str, key: str) -> Path:
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         raise InputError(
             f"{key} = {shown(name)} is a link that leads out of the plan's folder; put the file "
-            f"itself beside the plan"
+            f"itself next to the plan"
         )
     if len(place.parts) > 1:
         raise InputError(
-            f"{key} = {shown(name)} is in another folder; put the file beside the plan"
+            f"{key} = {shown(name)} is in another folder; put the file next to the plan"
         )
     return path
 

@@ -125,7 +125,7 @@ class _SpringBase(TomlTable):
         return Spring(self.modulus_Pa, limit, self.spring, tuple(getattr(self, n) for n in names))
 
 
-#: Keys of the parameters of all strain energies, beside the limit.
+#: Keys of the parameters of all strain energies, next to the limit.
 _SHAPES = tuple(
     dict.fromkeys(p.name for law in SPRING_LAWS.values() for p in law.parameters if p.name != LIMIT)
 )
@@ -318,7 +318,7 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "item"):
         return value.item()
     if isinstance(value, str):
-        # a file whose name is no text in this system's encoding still has a place in a history
+        # a file whose name is not text in this system's encoding still has a place in a history
         return value.encode("utf-8", "replace").decode("utf-8")
     return value
 
@@ -359,7 +359,8 @@ def _sentence(error: ValidationError) -> str:
         most = fault["ctx"]["max_length"]
         return f"{key} = {shown(fault['input'])} is too long: {most:,} are read at most"
     if str(last) in _LISTS:
-        return f"{key} = {shown(fault['input'])} is no list of tables: write [[{last}]] above each"
+        given = shown(fault["input"])
+        return f"{key} = {given} is not a list of tables: write [[{last}]] above each"
     words = "a number" if info is None else allowed(info)
     if words == "a table":
         return f"{key} = {shown(fault['input'])} is not a table: write [{key}] above its keys"

@@ -42,7 +42,7 @@ class Notify:
         """Return the settings with the program's path and the webhook's address.
 
         Raises ``InputError`` for a command or an address that cannot work: without this check
-        nobody would notice it until a campaign of days ends.
+        no one would notice it until a campaign of days ends.
         """
         command = self.command
         if command:

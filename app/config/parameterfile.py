@@ -141,7 +141,7 @@ def constraints_of(
 
 
 def _unknown(key: str, known: Sequence[str], derived: Sequence[str]) -> str:
-    """Return a sentence on a ``key`` that is no parameter of the fit."""
+    """Return a sentence on a ``key`` that is not a parameter of the fit."""
     for name in derived:
         if key.startswith(name):
             return f"{key}: {name} follows from the measured rest length, and is not fitted"

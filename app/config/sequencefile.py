@@ -54,7 +54,7 @@ HELD_SAMPLES_MAX = 250_000_000
 
 @dataclass(frozen=True)
 class SequenceFault:
-    """A fault of a sequence: a whole ``sentence``, and ``words`` to stand beside its field.
+    """A fault of a sequence: a whole ``sentence``, and ``words`` to stand next to its field.
 
     ``row`` is the table [[segment]] from 0, ``key`` its key; both are None where the fault has
     none. A key without a row is one of the head.
@@ -149,7 +149,7 @@ class _Head(TomlTable):
     )
 
 
-#: Keys of a sequence file beside its segments.
+#: Keys of a sequence file next to its segments.
 HEAD_FIELDS: Mapping[str, FieldInfo] = MappingProxyType(_Head.model_fields)
 
 
@@ -299,7 +299,7 @@ def _faults(
     found = sorted(
         error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
     )
-    # a missing key beside an unknown one is probably the key that was meant
+    # a missing key next to an unknown one is probably the key that was meant
     unknown = {f["loc"][:-1] for f in found if f["type"] == "extra_forbidden"}
     return [
         _fault(f, data, kinds)

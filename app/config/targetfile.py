@@ -113,7 +113,7 @@ class LoadedTarget:
 def target_of(time: np.ndarray, displacement: np.ndarray, name: str = "target") -> LoadedTarget:
     """Return the target of ``displacement`` (N,) m at ``time`` (N,) s, with lines in between.
 
-    Raises ``InputError`` for arrays that are no path, or that do not start and end at 0.
+    Raises ``InputError`` for arrays that are not a path, or that do not start and end at 0.
     """
     try:
         path = Sampled(np.asarray(time), np.asarray(displacement, dtype=np.float64) / _M)
@@ -152,7 +152,7 @@ def read_target(
 ) -> tuple[LoadedTarget | None, tuple[SequenceFault, ...]]:
     """Return the target in the TOML ``text``, or None and all of its faults.
 
-    Raises ``InputError`` for a text that is no TOML, or whose keys are voltages.
+    Raises ``InputError`` for a text that is not TOML, or whose keys are voltages.
     """
     data = parse_toml(text, name)
     tables = data.get("segment")

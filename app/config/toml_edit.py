@@ -1,9 +1,9 @@
-"""TOML files edited in place: comments, order and the letters of what nobody changed stay.
+"""TOML files edited in place: comments, order and the letters of what no one changed stay.
 
 tomlkit edits one table at a time. The segments of a sequence are kept as separate texts, so that
 the comments above a segment go with it when it is moved or removed, and so that a keystroke in a
 long sequence takes no longer than in a short one. Every edit is read again and compared with the
-tables that are wanted; a file whose form cannot be edited in place is written anew below its
+tables that are wanted; a file whose form cannot be edited in place is written again below its
 comments.
 """
 
@@ -35,7 +35,7 @@ def with_key(text: str, table: str, key: str, value: Any) -> str:
     before, wanted = tomllib.loads(text), tomllib.loads(text)
     here = wanted.setdefault(table, {}) if table else wanted
     if not isinstance(here, dict):
-        return text  # the check of the file says that it is no table
+        return text  # the check of the file says that it is not a table
     _put(here, key, value)
     if value is None and key not in (before.get(table, {}) if table else before):
         return text
@@ -177,7 +177,7 @@ def _in_document(text: str, find: Callable[[Any], Any], key: str, value: Any) ->
             )
         return tomlkit.dumps(document)
     except (tomlkit.exceptions.TOMLKitError, KeyError, IndexError, TypeError, ValueError):
-        return ""  # it is written anew
+        return ""  # it is written again
 
 
 def _place_for(key: str, body: list[tuple[Any, Any]]) -> int:

@@ -34,7 +34,7 @@ _SECTIONS = (
     ("How to", ("app/docs/how-to/",)),
     ("Explanation", ("app/docs/explanation/",)),
     ("Reference", ("app/docs/reference/",)),
-    ("Beside the code", ("app/", "drivers/", "model/", "sim_backend/")),
+    ("Next to the code", ("app/", "drivers/", "model/", "sim_backend/")),
     ("Decisions", ("app/docs/decisions/",)),
 )
 #: Sections whose pages the navigation shows on every page.
@@ -141,7 +141,7 @@ def _documents() -> Iterator[tuple[str, Path]]:
 
 
 def _root(folder: str) -> Path:
-    """Folder on this computer: in a checkout beside the others, installed inside ``dearig``."""
+    """Folder on this computer: in a checkout next to the others, installed inside ``dearig``."""
     spec = importlib.util.find_spec(_FOLDERS[folder])
     if spec is None or not spec.submodule_search_locations:
         raise InputError(f"the package {_FOLDERS[folder]} is not installed; install dearig again")

@@ -116,7 +116,7 @@ def one_line(error: Exception, most: int = 300) -> str:
 def replaced_when_done(path: Path, overwrite: bool) -> Iterator[Path]:
     """Yield an empty file in the folder of ``path`` to write to; it becomes ``path`` at the end.
 
-    This happens in one step, and only if the body succeeds. The file has a random name that nobody
+    This happens in one step, and only if the body succeeds. The file has a random name that no one
     could have prepared, a link for instance. A file that is replaced keeps its permissions. Raises
     ``InputError`` for a ``path`` that is in use, and without ``overwrite`` for one that exists
     meanwhile. The body should only write: an ``OSError`` in it becomes an ``InputError``, and so
@@ -163,7 +163,7 @@ def _create_partial(folder: Path) -> FileLock:
 
 
 def _remove_abandoned(folder: Path) -> None:
-    """Remove the unfinished outputs of ended programs in ``folder``: nobody holds their locks."""
+    """Remove the unfinished outputs of ended programs in ``folder``: no one holds their locks."""
     with os.scandir(folder) as items:
         found = [Path(item.path) for item in items if _PARTIAL_NAME.fullmatch(item.name)]
     for path in found:

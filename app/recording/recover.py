@@ -35,7 +35,7 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
     if reason := why_no_file(path):
         raise InputError(f"{path} {reason}")
     if path.is_symlink():
-        # the journal is beside the file itself
+        # the journal is next to the file itself
         path = path.resolve()
     open_recording(path)
     try:

@@ -97,7 +97,7 @@ def _state(found: Verification, recording: Recording) -> None:
     if whole_journal(found.path) is not None:
         found.notes.append(
             Note(
-                "its last changes are in a journal beside it; recover it to apply them",
+                "its last changes are in a journal next to it; recover it to apply them",
                 command=_RECOVER,
             )
         )

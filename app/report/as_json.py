@@ -386,7 +386,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
 
 
 def _displacement_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
-    """The displacement, or a film's stress, as a channel beside the electrical ones."""
+    """The displacement, or a film's stress, as a channel next to the electrical ones."""
     finding = outcome.finding
     return {
         "name": "displacement" if outcome.kind == "actuator" else "nominal_stress",

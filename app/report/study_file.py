@@ -124,7 +124,7 @@ def _read_words(folder: Path) -> dict[str, Any]:
     if not isinstance(words, dict) or words.get("format") != FORMAT:
         raise InputError(
             f"{path} is not of the format {FORMAT}, which this version reads; open report.html "
-            f"beside it, or do the study again"
+            f"next to it, or do the study again"
         )
     return words
 

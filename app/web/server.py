@@ -64,7 +64,7 @@ class WatchServer:
         feed = Feed(lambda: look(watch), every, lambda: bool(self._server.should_exit))
         config = uvicorn.Config(
             watch_app(feed, host, self.port, token),
-            # the log would have the token, and a page that was opened is no news
+            # the log would have the token, and a page that was opened is not news
             log_config=None, access_log=False, log_level="error", server_header=False,
             http=PatientProtocol, ws="none", lifespan="off", limit_concurrency=200,
             timeout_graceful_shutdown=3,

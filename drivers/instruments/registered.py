@@ -29,9 +29,10 @@ def _check(name: str, driver: Any) -> None:
     # all kinds of drivers have these members; the role distinguishes them
     role = getattr(driver, "role", None)
     if role not in _ROLES or not callable(getattr(driver, "inspect", None)):
-        raise TypeError(f"{name} is no driver: it needs a role ({' or '.join(_ROLES)}) and inspect")
+        roles = " or ".join(_ROLES)
+        raise TypeError(f"{name} is not a driver: it needs a role ({roles}) and inspect")
     if role == "thermohygrometer" and not callable(getattr(driver, "open", None)):
-        raise TypeError(f"{name} is no driver of a thermohygrometer: it needs open too")
+        raise TypeError(f"{name} is not a driver of a thermohygrometer: it needs open too")
 
 
 #: One line for each driver; other distributions add theirs by the entry point.

@@ -119,7 +119,7 @@ class VaisalaProbe:
             )
         shown = ascii(seen[:_SHOWN].decode("ascii", "backslashreplace")).replace("\\\\", "\\")
         return ThermohygrometerError(
-            f"the answer on {where} is {shown}, which is no reading",
+            f"the answer on {where} is {shown}, which is not a reading",
             "set thermohygrometer.baud_rate as in the sensor, and its output (FORM) to values with "
             "names and units",
         )

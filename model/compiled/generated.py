@@ -1,6 +1,6 @@
 """Compiled functions whose source a program writes: numba needs real functions, and a file of them.
 
-The file lies beside the compiled kernels, in the folder that is named after all sources.
+The file lies next to the compiled kernels, in the folder that is named after all sources.
 """
 
 from __future__ import annotations

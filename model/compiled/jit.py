@@ -92,7 +92,7 @@ def _use(digest: str) -> None:
     folder = _folder(digest)
     _folders[:] = [folder]
     _settings["CACHE_DIR"] = "" if folder.path is None else str(folder.path)
-    # the variable NUMBA_CACHE_LOCATOR_CLASSES would send numba to folders that nobody has checked
+    # the variable NUMBA_CACHE_LOCATOR_CLASSES would send numba to folders that no one has checked
     _settings["CACHE_LOCATOR_CLASSES"] = ""
     if folder.note:
         log.info("cache of compiled kernels: %s", folder.note)
@@ -249,7 +249,7 @@ def inlined(function: _Function) -> _Function:
 def read_only(array: np.ndarray) -> np.ndarray:
     """Return a view of ``array`` that cannot be written.
 
-    To numba an array that can be written is of another type, for which it compiles a kernel anew:
+    To numba an array that can be written is of another type, for which it compiles a kernel again:
     half a minute where a record comes from a file after one that was computed.
     """
     view = array.view()

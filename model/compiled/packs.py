@@ -246,7 +246,7 @@ def _larger(_typing: Any, one: Any, other: Any) -> Any:
     def code(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
         below = builder.fsub(ir.Constant(_VECTOR, [0.0] * WIDTH), args[1])
         size = builder.select(builder.fcmp_ordered(">", below, args[1]), below, args[1])
-        # of a size that is no number the comparison is false, as of one film
+        # of a size that is not a number the comparison is false, as of one film
         return builder.select(builder.fcmp_ordered(">", size, args[0]), size, args[0])
 
     return _PACK(one, other), code

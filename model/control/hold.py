@@ -48,11 +48,11 @@ class HoldSettings:
     delay : float
         Time in s from the middle of these readings to the middle of the block that answers them.
     response : float
-        Response time tau in s of the closed loop, beside the delay.
+        Response time tau in s of the closed loop, next to the delay.
     authority, rate_limit : float
         Largest correction either way, and its largest change in 1/s.
     resolution : float
-        Step of a reading in m; deviations as small as this are no outliers.
+        Step of a reading in m; deviations as small as this are not outliers.
     """
 
     setpoint: float
@@ -133,7 +133,7 @@ class HoldController:
 def block_mean(readings: np.ndarray, usable: np.ndarray, resolution: float) -> float:
     """Return the mean in m of the usable ``readings`` (n,) without outliers, or NaN for none.
 
-    ``resolution`` in m is the step of a reading: a smaller deviation is no outlier.
+    ``resolution`` in m is the step of a reading: a smaller deviation is not an outlier.
     """
     seen = readings[usable & np.isfinite(readings)]
     if 2 * seen.size < readings.size or seen.size == 0:

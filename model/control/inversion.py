@@ -54,7 +54,7 @@ __all__ = ["CAUSES", "Inversion", "Unreachable", "invert"]
 _PASSES = 30  # of the quasi-Newton iteration
 _REMEMBERED = 6  # passes of which Anderson's acceleration makes use
 _CLOSE = 0.01e-6  # m: no pass follows an error that is nowhere larger
-_SMALL = 0.1e-6  # m: an error that counts as small beside what is unreachable
+_SMALL = 0.1e-6  # m: an error that counts as small next to what is unreachable
 _SENSOR_PASSES = 4  # of a sensor effect along the target, for the start
 _ELECTRIC_PASSES = 3  # of what is between command and film along the target, for the start
 _AT_LIMIT = 1e-3  # of the highest voltage: so near it stands at a limit
@@ -101,7 +101,7 @@ class Unreachable:
 
 #: Why a target is unreachable, by its short name.
 CAUSES = {
-    "zero": "the film does not return so fast by itself, and no voltage pushes it",
+    "zero": "the film does not return so fast on its own, and no voltage pushes it",
     "voltage": "the path needs more than the highest voltage",
     "field": "the path needs more than the highest true field",
     "pull-in": "the film would pull in",

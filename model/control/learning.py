@@ -315,7 +315,7 @@ class Learner:
     def _spread(self, alternatives: Sequence[Actuator]) -> np.ndarray:
         """Return |G_other/(k G) - 1| (M,), the root of the squares of all ``alternatives``.
 
-        ``k`` is a gain over the lines of the path, which learning finds by itself.
+        ``k`` is a gain over the lines of the path, which learning finds on its own.
         """
         spread = np.zeros(self._frequency.size)
         square = np.square(self.first.voltage)

@@ -201,9 +201,9 @@ class Conclusion:
     def predicting(self, fit: Fit, careful: Fit) -> Actuator | Strip:
         """Return the model that predicts other recordings: without what may not happen again.
 
-        The rest is refitted without it, so that whoever has found nothing else predicts as before.
-        Only where it leaves half of what any fit without it leaves, the rest stays as it is beside
-        it: then no law plays it, and the others would be bent by it.
+        The rest is refitted without it, so that a diagnosis that found nothing else predicts as
+        before. Only where it leaves half of what any fit without it leaves, the rest stays as it is
+        next to it: then no law plays it, and the others would be bent by it.
         """
         once = {m for m in fit.members if m == DRIFT or not EFFECTS[m].is_reproducible}
         if not once:

@@ -61,7 +61,7 @@ def own_of(
     may_drift: bool = True,
     others: Sequence[Record] = (),
 ) -> Own | None:
-    """Return the events and the drift of ``record`` beside ``model``; None in white noise alone.
+    """Return the events and the drift of ``record`` next to ``model``; None in white noise alone.
 
     With ``may_drift`` False a slow error is not taken for drift: a missing law can be as slow. The
     readings at rest of ``others``, recordings with the same sensor, tell the colour of its noise
@@ -158,7 +158,7 @@ def _with_events(fitter: Fitter, judge: Judge, best: Fit) -> Fit:
         whole = [_from_the_start(fitter, top, held), _of_other_springs(best, held)]
         judge.see(whole)
         if any(judge.gain(other, top) < odds for other in whole):
-            break  # the whole recording differs from the model: this is no event
+            break  # the whole recording differs from the model: this is not an event
         best = top
     return best
 

@@ -241,8 +241,8 @@ class Judge:
 
         Weighs each by exp(-C/2t), with prior odds of e^(-odds/2) an effect, with the
         tempering t of the settings. A family that was ``sought``, and of which there is no fit
-        beside the baseline alone, is taken for one effect of one number that explains nothing: that
-        a record does not show it does not exclude it.
+        next to the baseline alone, is taken for one effect of one number that explains nothing:
+        that a record does not show it does not exclude it.
         """
         if not fits:
             return [(1.0, ["none"])]

@@ -1,7 +1,7 @@
 """The race of candidates: successive halving of output-error fits (Jamieson and Talwalkar, 2016).
 
 Each rung fits fewer candidates for more iterations. In the first ones, two starts of each candidate
-run abreast: with springs anew and with the parent's.
+run abreast: with new springs and with the parent's.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ _WEAK = 1e-3  # of the largest modulus: a branch without weight still needs infl
 class Start:
     """Where a fit begins: the numbers of an effect, and springs, in two ways.
 
-    With springs anew, of ``moduli`` (1 + n,) in Pa and ``times`` (n,) in s, they are ``values``.
+    With springs again, of ``moduli`` (1 + n,) in Pa and ``times`` (n,) in s, they are ``values``.
     With the parent's, moved by ``shift`` (f,) in the parent's free coordinates, they are
     ``shifted``. ``misfit`` is the RMS, in noises of a mean, that the regression leaves.
     """
@@ -374,7 +374,7 @@ class Regression:
         return found | {e.name: [self._unseen(e)] for e in effects if is_unseen(e)}
 
     def _unseen(self, effect: Effect) -> Start:
-        """Return a start beside the parent's springs of an effect that has no column."""
+        """Return a start next to the parent's springs of an effect that has no column."""
         network = self.model.network
         values = typical_values(effect)
         moduli = np.array([spring.modulus for spring in network.springs])

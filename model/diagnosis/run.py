@@ -19,11 +19,11 @@ from dearig.model.simulation.strip import Strip
 __all__ = ["diagnose"]
 
 _LAST = 0.94  # of the progress: then come the final fits
-_HELD_ITERATIONS = 20  # of fits that begin beside a fit to the same readings
+_HELD_ITERATIONS = 20  # of fits that begin next to a fit to the same readings
 
 
 def _quiet(stage: str, fraction: float) -> None:
-    """Progress that nobody watches."""
+    """Progress that no one watches."""
 
 
 def _never() -> bool:
@@ -31,7 +31,7 @@ def _never() -> bool:
 
 
 def _silent(line: str) -> None:
-    """A log that nobody reads."""
+    """A log that no one reads."""
 
 
 def diagnose(

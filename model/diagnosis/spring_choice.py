@@ -90,7 +90,7 @@ def choose_springs(
 
 
 def _beside(candidate: Actuator | Strip, fits: Sequence[Fit]) -> Network | None:
-    """Return a start of a ``candidate``: its equilibrium spring beside the best branches so far.
+    """Return a start of a ``candidate``: its equilibrium spring next to the best branches so far.
 
     With it a law with more parameters, or more branches, does not fit worse by its starts alone.
     """

@@ -3,7 +3,7 @@
 An effect at its neutral values is skipped, so one compiled kernel serves every combination. Which
 effects are active is determined once a simulation, as bits of one number. Numba needs real
 functions with literal offsets, and a file to cache them by. So the source of the hooks is written
-beside the compiled kernels, in the folder that is named after the sources of all effects.
+next to the compiled kernels, in the folder that is named after the sources of all effects.
 
 An assembled hook takes ``(on, c, m)`` and the arguments of ``HOOKS``; ``on`` is ``active(c)``, or
 ``active_sensors(c)`` for ``sense``. ``m`` is the state of all effects of the motion, or of all

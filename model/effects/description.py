@@ -202,7 +202,7 @@ class Effect:
         The effect depends on the path between turning points. The integrator then resolves every
         turning point of a film that rings, even those of less than a tenth of a micrometre.
     is_reproducible
-        False for an event of one recording that is no property of the rig, as a jump of the
+        False for an event of one recording that is not a property of the rig, as a jump of the
         sensor. No other recording is predicted with it.
     is_general
         The effect is the general law of its family: linear in its amplitudes, non-negative weights
@@ -214,7 +214,7 @@ class Effect:
         For a general law: a function of the parameters' values by name that returns the ``Curve``
         that they describe.
     needs
-        What recordings must have beside voltage and displacement: ``temperature`` during each, or
+        What recordings must have next to voltage and displacement: ``temperature`` during each, or
         ``temperatures`` or ``humidity`` of several recordings that differ in it. Empty for most.
     law
         Its equations with the symbols of its parameters, and their source. Every effect of this

@@ -40,7 +40,7 @@ def boxed_step(
     step = -cho_solve((root, False), gradient)
     if np.all((low <= step) & (step <= high)):
         return np.asarray(step)
-    # a coordinate without room between its bounds is no unknown
+    # a coordinate without room between its bounds is not an unknown
     open_ = high - low > 1e-12 * (1.0 + np.abs(low) + np.abs(high))
     step = np.where(open_, 0.0, np.clip(0.0, low, high))
     if open_.any():

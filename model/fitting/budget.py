@@ -72,7 +72,7 @@ def uncertainty_budget(
     ``model`` is fitted to the ``records``, with its parameters ``held`` (d,) bool not fitted, and
     with ``constraints`` stated of parameters. A
     drift that it has is fitted to each record for itself. () where ``stop()`` is True before the
-    end: a part of the contributions is no budget.
+    end: a part of the contributions is not a budget.
     """
     problem = coarse_problem(Problem(records, FitLayout(model, constraints=constraints), workers))
     layout = problem.layout

@@ -1,4 +1,4 @@
-"""Sensor drift of each recording by itself, eliminated by linear least squares.
+"""Sensor drift of each recording on its own, eliminated by linear least squares.
 
 Recordings of one rig share the parameters of the film, but each has its own slow drift of the
 reading. Drift is linear in its amplitudes, so for any values of the other parameters the best

@@ -80,7 +80,7 @@ def recentre(means: Problem, full: Problem, values: np.ndarray) -> None:
     means.set_readings(of_means[0] + moved)
 
 
-class _Ended(Exception):  # noqa: N818  (it is no error)
+class _Ended(Exception):  # noqa: N818  (it is not an error)
     """The profiles are to end."""
 
 

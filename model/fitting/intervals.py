@@ -234,7 +234,7 @@ def linear_ends(
     return np.clip(found, layout.lower, layout.upper)
 
 
-class BetterPoint(Exception):  # noqa: N818  (it is no error)
+class BetterPoint(Exception):  # noqa: N818  (it is not an error)
     """A point ``x`` (d,) whose chi-square is ``gained`` below that of the optimum of intervals."""
 
     def __init__(self, x: np.ndarray, gained: float) -> None:

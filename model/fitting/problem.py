@@ -55,7 +55,7 @@ class Problem:
     coarse drives give; None where none are.
 
     The offset of each record is eliminated in every prediction (``dearig.model.fitting.offsets``)
-    unless ``exact_zero``, and so is drift that each of several records has by itself
+    unless ``exact_zero``, and so is drift that each of several records has on its own
     (``dearig.model.fitting.drift``); the layout's amplitudes of it then have no influence.
 
     A prior of the layout is one more reading: its row, the distance from its mean in standard
@@ -545,7 +545,7 @@ class Problem:
     def _one_side(
         self, x: np.ndarray, free: np.ndarray, steps: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return coordinates (f, d) beside ``x`` (d,) by ``steps`` (d,), and those steps (f,)."""
+        """Return coordinates (f, d) next to ``x`` (d,) by ``steps`` (d,), and those steps (f,)."""
         # away from a bound that is near
         steps = np.where(x + steps > self.layout.upper, -steps, steps)
         return x + np.diag(steps)[free], steps[free]

@@ -77,7 +77,7 @@ def algorithm_1(
     bounds = np.array([q.within(THESIS_RANGES.get(q.kind, q.bounds)) for q in layout.quantities])
     rng = np.random.default_rng(seed)
     members = rng.uniform(bounds[:, 0], bounds[:, 1], (settings.members, layout.size))
-    # the open ends of the ranges: a modulus or a limit of exactly 0 is no spring
+    # the open ends of the ranges: a modulus or a limit of exactly 0 is not a spring
     lowest = np.array([_LEAST.get(q.kind, -inf) for q in layout.quantities])
 
     def cost(population: np.ndarray) -> np.ndarray:

@@ -90,7 +90,7 @@ def pink_density(records: Sequence[Record], odds: float, alike: float) -> float:
     Whittle's likelihood of the lead-ins' periodograms below 15 Hz, less their straight line and
     what is periodic, of a density w + p/f over one of w. p is believed where twice the logarithm of
     their ratio is above ``odds``, and where that of a walk or a drift, of density w + p/f^2, over
-    it is below ``alike``. Where the rest does not tell them apart, the search tries a drift beside
+    it is below ``alike``. Where the rest does not tell them apart, the search tries a drift next to
     the 1/f noise.
     """
     frequency: list[np.ndarray] = [np.zeros(0)]

@@ -3,8 +3,8 @@
 Two branches of nearly equal relaxation times act as one: the data fix the sum of their moduli, not
 the parts. A fit may then have both, or one of them and another branch that does next to nothing,
 with the same error. A profile that begins at the fit stays in its valley. So each branch that the
-data do not fix is put beside each of the others, and where it is as fast and as slow as the records
-resolve; what is as good there counts for the intervals.
+data do not fix is put next to each of the others, and where it is as fast and as slow as the
+records resolve; what is as good there counts for the intervals.
 """
 
 from __future__ import annotations
@@ -184,7 +184,7 @@ def valleys_of(best: Optimum, estimates: Sequence[Estimate]) -> Valleys | None:
     alone = Valleys(best, spare, firm, {})
 
     def followed(start: np.ndarray) -> LocalFit:
-        problem = copy(best.problem)  # counts its simulations by itself
+        problem = copy(best.problem)  # counts its simulations on its own
         return descend(problem, start, best.held, _ITERATIONS, _GAIN * best.threshold, quick=False)
 
     starts = [start for branch in spare for start in _starts(alone, branch)]
@@ -252,7 +252,7 @@ def _starts(found: Valleys, branch: int) -> Iterator[np.ndarray]:
     for time, site in _places(found):
         x = found.best.x.copy()
         x[own["T", 0]] = time
-        # as little as a difference quotient resolves; beside another one, half of that
+        # as little as a difference quotient resolves; next to another one, half of that
         x[own["mu", 0]] = layout.differences(x)[own["mu", 0]]
         theirs = _columns(layout, site) if site > 0 else {}
         for key in own.keys() & theirs.keys():

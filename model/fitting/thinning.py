@@ -68,7 +68,7 @@ def _mean_square(differences: np.ndarray, thin: ActuatorRecord, inside: int = 0)
     if thin.valid is not None:
         good = thin.valid.copy()
         for _ in range(inside):
-            # beside a masked reading the difference is unknown too
+            # next to a masked reading the difference is unknown too
             good[1:-1] &= good[:-2] & good[2:]
         differences = differences[good[inside : good.size - inside]]
     return float(np.mean((differences / thin.noise) ** 2)) if differences.size else 0.0

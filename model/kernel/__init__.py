@@ -7,7 +7,7 @@ interval it takes as many equal steps as the accuracy needs. There are three met
 * ``exponential_rk``: exponential Runge-Kutta of order 4 for the thesis's film (width held, Gent or
   neo-Hookean springs, three branches at most). The linear part of the motion is in closed form: the
   film's oscillation, the relaxation of the branches and a drag. A drag may be as strong as it
-  likes; only what is nonlinear limits the step. ``EXPONENTIAL.md`` beside this package derives it.
+  likes; only what is nonlinear limits the step. ``EXPONENTIAL.md`` next to this package derives it.
 * ``rk4``: classical Runge-Kutta of order 4 for other films that are not stiff for the record's
   sample interval.
 * ``rodas``: RODAS, an L-stable Rosenbrock method of order 4 with an error estimate, for stiff

@@ -296,7 +296,7 @@ def _prepared(
 ) -> tuple[Policy, int, np.ndarray, Workspace]:
     """Return the steps of film ``c``, its effects, its coefficients with all inertia, and arrays.
 
-    Whoever makes arrays counts their owners, in every call: the loop must not. And what calls the
+    What makes arrays counts their owners, in every call: the loop must not. And what calls the
     loop from compiled code contains it: it would be compiled once more.
     """
     springs = spring_table(c)

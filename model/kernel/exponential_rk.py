@@ -1,7 +1,7 @@
 """Exponential Runge-Kutta of order 4 for the thesis's film, with effects or without.
 
 The method of Cox and Matthews (J. Comput. Phys. 176, 2002) on the motion split as ``propagator``
-has it. ``EXPONENTIAL.md`` beside this package derives every line; its names are used here.
+has it. ``EXPONENTIAL.md`` next to this package derives every line; its names are used here.
 """
 
 from __future__ import annotations

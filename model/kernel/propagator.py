@@ -2,7 +2,7 @@
 
 z'' = -k z - d z' + w I + N and I' = z - f I, where z is how far the film has moved since the step
 began and I what the branches have given way by, as one branch would that relaxes at their mean rate
-f. ``EXPONENTIAL.md`` beside this package derives it.
+f. ``EXPONENTIAL.md`` next to this package derives it.
 """
 
 from __future__ import annotations

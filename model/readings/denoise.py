@@ -45,7 +45,7 @@ def smoothed(voltage: np.ndarray, noise: float) -> np.ndarray:
             continue
         smooth = savgol_filter(voltage, window, 2, mode="interp")
         away = voltage - smooth
-        # about the window, so that an edge beside it is not smoothed over either
+        # about the window, so that an edge next to it is not smoothed over either
         # (a running sum, which rounding may leave just below 0)
         square = uniform_filter1d(away**2, window, mode="nearest")
         local = np.sqrt(np.maximum(square, 0.0))

@@ -43,7 +43,7 @@ NOISE_MARGIN = 1.08
 REST_MIN = 100
 #: Fewer readings have no second difference to average.
 READINGS_MIN = 4
-_FAST = 0.1  # s: what changes more slowly is no noise of single readings
+_FAST = 0.1  # s: what changes more slowly is not noise of single readings
 #: Noise at rest over that about means of a tenth of a second: three quarters of its power are slow.
 #: With 1/f noise as large as white noise it is 1.2.
 _MOVES = 2.0
@@ -84,7 +84,7 @@ def noise_of(values: np.ndarray, valid: np.ndarray | None = None) -> float:
 def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
     """Standard deviation of the noise on readings (N,) at ``time`` (N,) of what hangs still.
 
-    N >= 4. About a straight line, and without what is periodic: mains on a cable is no noise, but
+    N >= 4. About a straight line, and without what is periodic: mains on a cable is not noise, but
     something to be found; taken for noise, it would hide everything that is smaller.
     """
     left, given = about_rest(time, values)
@@ -274,7 +274,7 @@ def _strongest_line(t: np.ndarray, values: np.ndarray) -> np.ndarray | None:
     bin_width = 1.0 / (n * float(t[1] - t[0]))
     half = power.size // 16 + 4
     fast = math.ceil(_SLOW / bin_width)
-    # the mean is no line, and a neighbour of a line is part of it
+    # the mean is not a line, and a neighbour of a line is part of it
     for first, end in ((fast, power.size), (_SLOWER + 2, min(fast, power.size))):
         if first >= end:
             continue

@@ -62,7 +62,7 @@ def spikes(time: np.ndarray, signal: np.ndarray, pull: np.ndarray, quiet: int) -
     tails = _at_rest(time[:quiet], signal[:quiet])
     # rounding alone moves a reading off its curve by a step
     limit = _OFF_NOISE * tails.limit(_MASKED_WRONGLY / signal.size) + tails.step
-    # what the drive may have moved, just now or before, is no spike
+    # what the drive may have moved, just now or before, is not a spike
     driven = scipy.ndimage.maximum_filter1d(np.abs(_off(pull)), 2 * _REACH + 1)
     driven /= float(np.max(np.abs(pull))) or 1.0
     moved = _DRIVEN * float(np.ptp(signal)) * driven
@@ -72,7 +72,7 @@ def spikes(time: np.ndarray, signal: np.ndarray, pull: np.ndarray, quiet: int) -
     alone = [_beside(signal, i) < width and not _rings(off, i) for i in map(int, far)]
     found[far[alone]] = True
     farthest = _CLEAR * tails.limit(_MASKED_WRONGLY / signal.size)
-    # a spike bends the curves of its neighbours: more than these are no spikes, but a misfit
+    # a spike bends the curves of its neighbours: more than these are not spikes, but a misfit
     few = far.size <= _OFF.size * _FEW * signal.size
     for i, j in _near_each_other(far, found) if few else ():
         if _are_two(signal, i, j, farthest, tails.step, width):

@@ -3,7 +3,7 @@
 With the stretch given there is no equation of motion: each branch is one scalar equation,
 dxi/dt = (1/T) P(lam(t)/xi) (eq. 40). It is solved from sample to sample; the stretch is linear in
 between. The method is RODAS, as for the stiff actuator, with steps by its error estimate. It is
-L-stable: a relaxation of milliseconds within a sample of a second is no difficulty.
+L-stable: a relaxation of milliseconds within a sample of a second is not a difficulty.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Strain energies of one spring, one file each; the README beside this says how to add one.
+"""Strain energies of one spring, one file each; the README next to this says how to add one.
 
 A law is W = modulus (U(I1 - 3) + sum w(lam_i)), of the spring's own principal stretches.
 """

@@ -1,7 +1,7 @@
 """Ogden spring of one term: W = 2 mu/alpha^2 (lam1^alpha + lam2^alpha + lam3^alpha - 3).
 
 mu is the initial shear modulus; the mu_1 of Ogden's paper is 2 mu/alpha. Incompressibility allows a
-multiple of ln lam1 + ln lam2 + ln lam3 = 0 to be taken off, so that alpha = 0 is no exception
+multiple of ln lam1 + ln lam2 + ln lam3 = 0 to be taken off, so that alpha = 0 is not an exception
 (Hencky's energy).
 """
 

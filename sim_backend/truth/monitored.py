@@ -2,7 +2,7 @@
 
 The monitor shows a fault of the output stage or of its supply; it does not show one of its own
 divider or of the stage behind it. The seed of a rig decides. A fault that would end the thesis's
-runs by the interlocks of the default rig file is never shown: nobody could record that rig.
+runs by the interlocks of the default rig file is never shown: no one could record that rig.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def test_nothing_grows_in_a_hundred_runs(tmp_path: Path) -> None:
             before = kept()
     after = kept()
     assert outcomes == {"finished", "interrupted"}
-    # Fewer is no fault: what an earlier test of this process left may be closed meanwhile.
+    # Fewer is not a fault: what an earlier test of this process left may be closed meanwhile.
     assert after[0] <= before[0]
     assert after[1] <= before[1]
     assert after[2] - before[2] < SLACK

@@ -230,7 +230,7 @@ def test_a_standard_error_without_a_reader_counts_as_a_closed_terminal(
     monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
     with pytest.raises(Interrupted, match="because the terminal was closed: the voltage was ramp"):
         record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5")
-    print("nobody sees it, and it is no error", file=stream)  # type: ignore[call-overload]
+    print("no one sees it, and it is not an error", file=stream)  # type: ignore[call-overload]
     assert closed_at_zero(rig)
     # under nohup a run goes on
     monkeypatch.setattr("dearig.acquisition.interrupts.signal.getsignal", lambda _: signal.SIG_IGN)
@@ -675,7 +675,7 @@ def test_a_disk_that_is_full_to_the_end_keeps_the_counts(
 def test_a_fault_of_the_program_itself_ends_at_0_volts_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rig = Troubled("read", lambda: {}["nobody foresaw this"])
+    rig = Troubled("read", lambda: {}["no one foresaw this"])
     monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
     with pytest.raises(KeyError):
         record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5")

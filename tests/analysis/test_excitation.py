@@ -29,7 +29,7 @@ SURE = replace(FOUND, indistinguishable_from=())
 
 
 def comparison(sequence: str, role: str, truth=DAMPED, seed: int = 0) -> Comparison:
-    """``FILM`` beside the recording of a film that is ``truth``."""
+    """``FILM`` next to the recording of a film that is ``truth``."""
     made = motion(sequence)
     measured = made.response + error(sequence, truth, seed)
     time = np.arange(measured.size) * STEP
@@ -102,7 +102,7 @@ def test_what_the_parameters_own_error_explains_is_no_missing_effect() -> None:
     assert headline(allowed) == "No missing effect found"
     assert "uncertainty of the fitted parameters is large enough" in summary(allowed)[0]
     assert replace(clean, prediction_errors=(2.0 * NOISE, 0.0)).judgement.reasons == ("validation",)
-    # beside an effect that was found, the error is the model's
+    # next to an effect that was found, the error is the model's
     found = replace(left("explained", 2.7, steps=(SURE,)), prediction_errors=(9.0, 9.0))
     assert found.verdict == "partly_explained"
 

@@ -60,7 +60,7 @@ def test_a_study_shows_saves_and_plots_itself(table, tmp_path: Path) -> None:
     assert "<html" in table.to_html(tmp_path / "t.html").read_text(encoding="utf-8")
     with pytest.raises(dearig.InputError, match=r"end the name in \.csv"):
         table.save(tmp_path / "t.txt")
-    with pytest.raises(dearig.InputError, match=r"'mu_9' is no number of this study; .*rms_um"):
+    with pytest.raises(dearig.InputError, match=r"'mu_9' is not a number of this study; .*rms_um"):
         table.plot("mu_9")
 
 
@@ -77,7 +77,7 @@ def test_a_study_without_a_folder_leaves_nothing_behind(table, tmp_path: Path) -
         ({"do": "validate"}, "a validation needs a model"),
         ({"do": "identify", "model": "model.toml"}, "a model file is for validate"),
         ({"do": "diagnose", "own": ["mu_0"]}, "are for identify"),
-        ({"do": "identify", "on": "moon"}, "'moon' is no place to compute at"),
+        ({"do": "identify", "on": "moon"}, "'moon' is not a place to compute at"),
     ],
 )
 def test_what_does_not_go_together_is_refused(run, wrong, said: str) -> None:

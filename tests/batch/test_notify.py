@@ -50,7 +50,7 @@ class Told:
 
     @property
     def all(self) -> list[dict]:
-        """What was told; commands run beside each other, so the order is that of their times."""
+        """What was told; commands run next to each other, so the order is that of their times."""
         await_notifications()
         return [json.loads(line) for line in self.file.read_text().splitlines()]
 

@@ -10,7 +10,7 @@ the whole method's. A fit that two variants make in the same way is made once.
 
 A rule earns its place if its row is worse than the first by more than chance: the last column is
 the probability of so large a difference in the number within the noise, either way, if the rule did
-nothing (the sign test on the rigs that differ). Rigs that were looked at are no evidence.
+nothing (the sign test on the rigs that differ). Rigs that were looked at are not evidence.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ def main() -> None:
     parser.add_argument("--generator", choices=tuple(GENERATORS), default="first", help="[first]")
     parser.add_argument("--noise", choices=NOISES, default=WHITE, help="[white]")
     parser.add_argument("--rate", type=float, default=200.0, help="Hz [200]")
-    parser.add_argument("--only", help="names of variants beside the whole, with commas between")
+    parser.add_argument("--only", help="names of variants next to the whole, with commas between")
     parser.add_argument("--effort", type=float, help="integration steps of a search [its own]")
     parser.add_argument("--keep", type=Path, help="append a line of JSON for each rig to this file")
     given = parser.parse_args()

@@ -8,7 +8,7 @@ BIC (what one would write in a week), and three ways to model the baseline's res
 trained on the same recordings and simulated freely on the same other ones.
 
 The residual's models need packages of their own: sysidentpy, pysindy and scikit-learn. Install them
-beside the project in an environment of its own (they may want another NumPy). One that is missing
+next to the project in an environment of its own (they may want another NumPy). One that is missing
 is named, and the others run.
 """
 

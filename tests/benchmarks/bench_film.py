@@ -1,7 +1,7 @@
 """What is found in a measured film, whichever of its recordings are fitted and whichever left out.
 
 Run as ``python -m tests.benchmarks.bench_film [DATA]``, DATA being the folder of the measured data
-(beside the checkout where it is not given). Every choice of one to three of the four recordings is
+(next to the checkout where it is not given). Every choice of one to three of the four recordings is
 diagnosed by ``dearig diagnose``, and the others are foreseen. RMS in kPa, before and after; * marks
 a recording that goes to a larger stretch than any that was fitted, or lasts much longer. Last come
 how many of these are foreseen better and worse than before.

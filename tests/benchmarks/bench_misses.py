@@ -56,7 +56,7 @@ REACHED, ONCE = "within 15 %", "once"
 COLUMNS = (SEARCH, EXCITATION, NOT_SHOWN, FORM, REACHED, ONCE)
 _CROSSED = 3  # fits of one search that are starts of the other
 _BESIDE = 2  # fits of a first family to which laws of a second one are added
-_ITERATIONS = 20  # of a fit that begins beside an optimum
+_ITERATIONS = 20  # of a fit that begins next to an optimum
 
 
 class Oracle:

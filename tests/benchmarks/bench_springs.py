@@ -1,7 +1,7 @@
 """Which strain energy silicones ask for, from pulls to failure.
 
 Run as ``python -m tests.benchmarks.bench_springs [FOLDER]``: FOLDER has CSV files of the Soft
-Robotics Materials Database (that beside the checkout where it is not given). Each file is imported
+Robotics Materials Database (that next to the checkout where it is not given). Each file is imported
 and fitted by ``dearig identify --spring choose --branches 0``: one pull at one rate does not tell
 relaxation from elasticity. A cell has the criterion above that of the best energy (minus twice the
 logarithm of the evidence) and the error of each tenth of the pull, predicted by a fit to the

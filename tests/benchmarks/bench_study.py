@@ -1,10 +1,10 @@
-"""Studies: what the engines cost beside the fits, and what a lost worker or scheduler changes.
+"""Studies: what the engines cost next to the fits, and what a lost worker or scheduler changes.
 
 ``python -m tests.benchmarks.bench_study --recordings 8``. The cluster is of real processes, which
 are killed; it needs the extra ``cluster``.
 
-``python -m tests.benchmarks.bench_study --beside 1000`` plays ``dearig study --do identify`` with
-two processes beside bare fits of the same recordings: ``identify_recordings`` of each path, in a
+``python -m tests.benchmarks.bench_study --next to 1000`` plays ``dearig study --do identify`` with
+two processes next to bare fits of the same recordings: ``identify_recordings`` of each path, in a
 ``multiprocessing`` pool of two. Both are whole programs, and read the files themselves. They run in
 turns of a few seconds, the other one being stopped (SIGSTOP), so that the load of the machine is
 the same for both. It prints their processor times and the sums of their turns, after each tenth of
@@ -186,7 +186,7 @@ class Turns:
 
 
 def beside(folder: Path, recordings: Path) -> None:
-    """Play a study beside bare fits of the same ``recordings``, in turns."""
+    """Play a study next to bare fits of the same ``recordings``, in turns."""
     paths = sorted(recordings.glob("*.h5"))
     count = len(paths)
     bare_fit(str(paths[0]))  # the kernels are compiled and kept

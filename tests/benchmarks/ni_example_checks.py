@@ -173,8 +173,8 @@ def _lines_at_rest(samples: int | None) -> Check:
         values = played.values("read", "read_waveform")
         flat = np.concatenate([np.ravel(v) for v in values])
         _expect(samples is None or flat.size == samples, f"{flat.size} values")
-        _expect(not flat.astype(bool).any(), "a line that nobody drives is high")
-        return f"{flat.size} values of lines that nobody drives"
+        _expect(not flat.astype(bool).any(), "a line that no one drives is high")
+        return f"{flat.size} values of lines that no one drives"
 
     return check
 

@@ -6,7 +6,7 @@ The PID loop reads every 20 ms, and its answer reaches the film 20 ms later: a f
 program on a desktop computer, which writes single values to the card. It is tuned as a careful
 user would: a step, the three numbers of a first-order lag with dead time from it (two points: C. L.
 Smith, Digital Computer Process Control, 1972), the SIMC rule with the closed-loop time equal to the
-dead time (S. Skogestad, J. Process Control 13, 291 (2003)), and then each gain by itself up and
+dead time (S. Skogestad, J. Process Control 13, 291 (2003)), and then each gain on its own up and
 down, on the path itself, for as long as that makes the error smaller.
 
 Learning without a model inverts the measured frequency response (inversion-based iterative
@@ -268,7 +268,7 @@ def _times(gains: Gains, factor: float) -> Gains:
 def _by_rule(found: Response) -> Gains:
     """Return the gains of the SIMC rule; what it leaves at 0 starts small, to be turned."""
     gains = simc(found)
-    # small beside the integral action over a dead time
+    # small next to the integral action over a dead time
     least = 0.1 * gains.integral * found.dead_time
     return replace(
         gains,

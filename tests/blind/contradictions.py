@@ -295,7 +295,7 @@ def _noise(said: Said) -> Iterator[str]:
             and s["rms_over_noise"] < 1.02
             and s["noise_p"] > 0.05
         ):
-            yield f"{name} is no noise, and every test says that it is"
+            yield f"{name} is not noise, and every test says that it is"
         only = any("only noise is left" in w for w in s["words"])
         if only != s["is_noise"]:
             yield f"{name}: is_noise is {s['is_noise']}, and the words say: {s['words'][0]}"

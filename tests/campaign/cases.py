@@ -129,7 +129,7 @@ _FROZEN = 1.0  # s; guardian.timeout_s, by default
 _UNANSWERED = 0.5  # s; an acknowledgement of the guardian
 _LOOK = 1.0  # s between two looks at the file
 _NOT_SAFE = "NOT CONFIRMED"
-_DEAF = Expected((4,), _ENABLE_LOW, said=_NOT_SAFE)  # nobody can reach the card but its watchdog
+_DEAF = Expected((4,), _ENABLE_LOW, said=_NOT_SAFE)  # no one can reach the card but its watchdog
 
 #: Trouble -> how it has to end.
 KINDS: dict[str, Expected] = {
@@ -400,7 +400,7 @@ def _recording_faults(kind: str, expected: Expected, moment: float, run: Run) ->
     if run.process.returncode == 0 and found != [run.out]:
         return [f"the run ended well, and left {found}"]
     if kind in ("file-deleted", "file-replaced"):
-        # its data were saved beside, or are gone and the run says so
+        # its data were saved in a copy, or are gone and the run says so
         found = [path for path in found if path != run.out or kind == "file-deleted"]
         if not found:
             return []

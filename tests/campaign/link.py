@@ -11,7 +11,7 @@ from types import TracebackType
 __all__ = ["MODES", "Link"]
 
 #: What the link does with what passes: all of it at once; none, and its connections are closed;
-#: none, and nobody is told; all of it 3 s later; all of it with one byte in a thousand changed;
+#: none, and no one is told; all of it 3 s later; all of it with one byte in a thousand changed;
 #: one byte in 20 ms.
 MODES = ("whole", "cut", "silent", "delayed", "corrupted", "trickling")
 

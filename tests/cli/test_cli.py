@@ -193,7 +193,7 @@ def test_record_info_export_import_round_trip(lobe: Path, tmp_path: Path) -> Non
     again = open_recording(tmp_path / "again.h5")
     np.testing.assert_array_equal(again.time, first.time)
     np.testing.assert_array_equal(again.voltage_command, first.voltage_command)
-    # counted anew from its lead-in, whose mean is zero already
+    # counted again from its lead-in, whose mean is zero already
     np.testing.assert_allclose(again.displacement, first.displacement, atol=1e-10)
 
 

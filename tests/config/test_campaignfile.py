@@ -106,7 +106,7 @@ def test_a_setting_changes_its_key_and_nothing_else(tmp_path: Path) -> None:
         (HEAD + 'order = "up"\n', 'but "as_written" or "random"'),
         (HEAD.replace("thesis", "thesys"), "did you mean thesis?"),
         (HEAD.replace("thesis", "../a.toml"), "leads out of the plan's folder"),
-        (HEAD.replace("thesis", "no.toml"), "neither a preset nor a file beside the plan"),
+        (HEAD.replace("thesis", "no.toml"), "neither a preset nor a file next to the plan"),
         (HEAD + "[grid]\nlead_in_s = 3\n", "grid.lead_in_s = 3 is not a list of values"),
         (HEAD + "[grid]\nlead_in_s = []\n", "is not a list of values"),
         (HEAD + '[grid]\n"segment.4.periods" = [1]\n', "places 0 to 0"),

@@ -45,7 +45,7 @@ class Jumping(HoldSegment):
 
 
 class Noisy(HoldSegment):
-    """A hold with noise that is drawn anew whenever it is computed."""
+    """A hold with noise that is drawn again whenever it is computed."""
 
     def build(self, folder: Path) -> Segment:
         built = super().build(folder)
@@ -64,7 +64,7 @@ class Noisy(HoldSegment):
 
 
 class Undescribed(HoldSegment):
-    """A kind with a key that nobody explains."""
+    """A kind with a key that no one explains."""
 
     level_kV: float = 0.0
 

@@ -1,4 +1,4 @@
-"""Files are edited in place: what nobody changed stays to the letter."""
+"""Files are edited in place: what no one changed stays to the letter."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from tests.tools.recording_victim import pattern
 
 __all__ = ["Told", "check", "told"]
 
-#: What files are called that stand beside a recording.
+#: What files are called that stand next to a recording.
 BESIDE = (".said", ".old")
 
 
@@ -32,7 +32,7 @@ class Told:
 
 
 def told(path: Path) -> Told:
-    """What stands in the file beside the recording ``path``."""
+    """What stands in the file next to the recording ``path``."""
     said = path.with_name(f"{path.name}.said")
     text = said.read_text("ascii") if said.exists() else ""
     return Told(line for line in text.split("\n")[:-1])

@@ -1,6 +1,6 @@
 """The tests that need minutes: full sets of cases of which the suite runs one of each kind.
 
-A test or a case marked ``deep`` stays beside its kind in the mirrored folders; the suite leaves it
+A test or a case marked ``deep`` stays next to its kind in the mirrored folders; the suite leaves it
 out, and ``python -m tests.deep`` runs it.
 """
 

@@ -132,7 +132,7 @@ def test_what_cannot_be_used_is_left_out_with_a_sentence(installed):
     assert "No module named 'acme_absent'" in found["absent"]
     assert "is not a kind of rig: it needs addresses" in found["wrong"]
     assert "already taken" in found["daqmx"]
-    assert "is no driver: it needs a role" in found["camera"]
+    assert "is not a driver: it needs a role" in found["camera"]
 
 
 @pytest.mark.deep

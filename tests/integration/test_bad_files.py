@@ -267,7 +267,7 @@ MODELS: dict[str, tuple[Callable[[str], str], list[str]]] = {
     "unknown kinematics": (_cut('"constrained-width"', '"loose"'), ['kinematics = "loose"']),
     "branch is a number": (
         lambda text: re.sub(r"branch = \[.*?\n\]\n", "branch = 3\n", text, flags=re.DOTALL),
-        ["branch = 3 is no list of tables", "[[branch]]"],
+        ["branch = 3 is not a list of tables", "[[branch]]"],
     ),
     "film is a number": (
         lambda text: "film = 3\n" + re.sub(r"\[film\].*(?=\[load\])", "", text, flags=re.DOTALL),

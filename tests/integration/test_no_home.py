@@ -22,7 +22,7 @@ pytestmark = [
 
 HOMES = {
     "a home in which nothing can be made": {"HOME": "/proc/home"},
-    "a home that is no folder": {"HOME": "/dev/null"},
+    "a home that is not a folder": {"HOME": "/dev/null"},
     "folders of the desktop that are none": {
         f"XDG_{name}_HOME": "/dev/null/x" for name in ("CACHE", "CONFIG", "STATE", "DATA")
     },
@@ -51,7 +51,7 @@ ALL = ("info run.h5", "docs --no-browser", "validate model.toml lobe.h5 --report
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize("name", mostly_deep(HOMES, ["a home that is no folder"]))
+@pytest.mark.parametrize("name", mostly_deep(HOMES, ["a home that is not a folder"]))
 def test_every_command_goes_on(tmp_path: Path, name: str) -> None:
     home, most = HOMES[name], name == "a home in which nothing can be made"
     (tmp_path / "tmp").mkdir()

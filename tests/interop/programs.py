@@ -16,7 +16,7 @@ class Program:
     """A program that writes measured data.
 
     ``packages`` are pinned requirements, the first one is the program; ``script`` writes the files.
-    A program that is no Python package has the ``command`` that takes the script, and is called
+    A program that is not a Python package has the ``command`` that takes the script, and is called
     ``tool`` where the script calls it.
     """
 

@@ -89,7 +89,7 @@ def test_studies_are_listed_and_a_damaged_one_says_so(tmp_path):
     save_study(view_of(made(tmp_path / "study-1", diagnose_outcome())))
     (tmp_path / "study-2").mkdir()
     (tmp_path / "study-2" / "study.json").write_text("{", encoding="utf-8")
-    (tmp_path / "a").mkdir()  # a folder that is no study
+    (tmp_path / "a").mkdir()  # a folder that is not a study
     listed = {folder.name: words for folder, words, _ in studies_in(tmp_path)}
     assert listed.keys() == {"study-1", "study-2"}
     assert "these data cannot tell" in listed["study-1"]

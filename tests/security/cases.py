@@ -131,7 +131,7 @@ SEQUENCES = {
     "fraction of 1 MB": Case(
         _record(f"{HEAD}[[segment]]\nkind = 'hold'\nduration_s = 0.{'1' * MILLION}\n"), code=None
     ),
-    "levels that are no numbers": Case(
+    "levels that are not numbers": Case(
         _record(
             f"{HEAD}[[segment]]\nkind = 'steps'\ndwell_s = 1.0\nlevels_kV = [{'true,' * 10_000}]"
         ),

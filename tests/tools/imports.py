@@ -25,7 +25,7 @@ TABLE = np.column_stack([TIME, VOLTAGE, MOVED * 1e3])
 
 
 def imported(path: Path, **options: object) -> Imported:
-    """Import a file as ``out.h5`` beside it."""
+    """Import a file as ``out.h5`` next to it."""
     out = path.parent / "out.h5"
     return import_file(path, out, ImportOptions(**options), overwrite=True, now=Clock())
 

@@ -22,7 +22,7 @@ from tests.tools.command import dearig, refused
 from tests.tools.played import Bench, Killed
 from tests.tools.recordings import run_counts, writer
 
-TOKEN = "a token that nobody guesses".replace(" ", "-")
+TOKEN = "a token that no one guesses".replace(" ", "-")
 HOSTILE = "<img src=x onerror=alert(1)>\u202e"
 
 

@@ -1,4 +1,4 @@
-"""Connections that never send a whole request keep nobody out, with or without a token."""
+"""Connections that never send a whole request keep no one out, with or without a token."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_half_sent_request_is_ended_and_others_are_answered(port, monkeypatch)
         silent.settimeout(ANSWERS_WITHIN)
         assert ended(silent)
     assert status(port) == 200
-    # after an answer the time runs anew
+    # after an answer the time runs again
     with socket.create_connection(("127.0.0.1", port), ANSWERS_WITHIN) as kept:
         kept.sendall(b"GET /icon.svg HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" + HALF)
         while kept.recv(4096):

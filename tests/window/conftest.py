@@ -64,7 +64,7 @@ def end_run(runner: Runner) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_teardown() -> Generator[None]:
-    """Close what a failed test left in any state: nobody is there to answer a question.
+    """Close what a failed test left in any state: no one is there to answer a question.
 
     pytest-qt closes the windows before any fixture ends, and destroys them. The thread of a run
     must have ended by then, or Qt ends the whole process.

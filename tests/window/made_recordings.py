@@ -51,5 +51,5 @@ def killed(folder: Path, name: str) -> Path:
         recorder.append(Block(start, counts[:, start : start + 500]))
     shutil.copyfile(running, out)
     recorder.discard()
-    os.utime(out, (1.8e9, 1.6e9))  # long ago: nobody is writing to it any more
+    os.utime(out, (1.8e9, 1.6e9))  # long ago: no one is writing to it any more
     return out

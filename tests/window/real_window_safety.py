@@ -126,7 +126,7 @@ def on_a_simulated_rig(story: Story) -> None:
     ends = []
     story.start()
     window.move(2000, 1500)
-    until(lambda: not available.contains(window.frameGeometry()), "a window beside the screen")
+    until(lambda: not available.contains(window.frameGeometry()), "a window next to the screen")
     until(lambda: available.contains(window.frameGeometry()), "a window that comes back")
     window.show_page(window.page(StudyPage))
     story.click(bar.stop_button)

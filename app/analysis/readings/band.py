@@ -89,7 +89,7 @@ class PredictionBand:
         return root_mean_square(self.parameters)
 
     def inside(self, error: np.ndarray) -> float:
-        """Return the share of the readings whose ``error`` (N,) is inside; NaN is no reading."""
+        """Return the share of the readings whose ``error`` (N,) is inside; NaN is not a reading."""
         good = np.isfinite(error)
         return float(np.mean(np.abs(error[good]) <= self.half_width[good]))
 

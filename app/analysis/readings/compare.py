@@ -168,7 +168,7 @@ def _converter_step(recording: Recording) -> float:
     if rises.size < MIN_QUIET:
         return 0.0
     step = float(rises.min())
-    # a step of rounding errors, or one of which the others are no multiples, is none
+    # a step of rounding errors, or one of which the others are not multiples, is none
     off = np.abs(rises / step - np.round(rises / step))
     is_even = step > _ROUNDING * float(np.abs(levels).max()) and float(off.max()) < _OFF_STEP
     return step if is_even else 0.0

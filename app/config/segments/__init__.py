@@ -1,7 +1,7 @@
 """Kinds of segment: one file for each kind or close family, one line here for each kind.
 
 Another distribution adds a kind through an entry point in the group ``dearig.segments``.
-``README.md`` beside this file shows how.
+``README.md`` next to this file shows how.
 """
 
 from __future__ import annotations

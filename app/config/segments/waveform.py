@@ -47,7 +47,7 @@ class Csv(SegmentTable):
         if place.is_absolute() or place.drive or ".." in place.parts:
             raise InputError(
                 f"file = {shown(self.file)} leads out of the sequence's folder; put the waveform "
-                f"beside the sequence, and name it without a path"
+                f"next to the sequence, and name it without a path"
             )
         # a name with a zero byte has no real path; its reading says what is wrong with it
         if "\0" not in self.file and not Path(os.path.realpath(folder / place)).is_relative_to(
@@ -55,7 +55,7 @@ class Csv(SegmentTable):
         ):
             raise InputError(
                 f"file = {shown(self.file)} is a link that leads out of the sequence's folder; "
-                f"put the waveform itself beside the sequence"
+                f"put the waveform itself next to the sequence"
             )
         source = TextFile(folder / place)
         scale = next((k for k in self.columns if k in source.names), None)

@@ -1,4 +1,4 @@
-"""Description of an exported table, in a file beside it: "Metadata for Tabular Data" of W3C (CSVW).
+"""Description of an exported table, in a file of its own: W3C's "Metadata for Tabular Data" (CSVW).
 
 A table of text has no place for units, events and the film, and programs that read such tables
 expect numbers below one line of names.
@@ -48,7 +48,7 @@ def write_beside(
 
 
 def description_beside(table: Path, sha256: str) -> dict[str, str] | None:
-    """Return what the file beside ``table``, which has that ``sha256``, says of it, as texts.
+    """Return what the file next to ``table``, which has that ``sha256``, says of it, as texts.
 
     None where it describes another table.
     """

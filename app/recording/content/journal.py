@@ -1,7 +1,7 @@
 """Changes of a file in place, made completely or not at all even if the program is killed.
 
 Appended bytes go into the file at once, because nothing in the file refers to them yet. Bytes that
-replace others are held back; they are written with the old bytes to ``FILE.journal`` beside the
+replace others are held back; they are written with the old bytes to ``FILE.journal`` next to the
 file, and only then into the file. An incomplete journal has changed nothing. A complete one is
 applied by the next recovery, and readers show the file as if it had been applied.
 """
@@ -292,7 +292,7 @@ def _either(here: bytes, old: bytes, new: bytes) -> bool:
 
 
 def carry_out(path: Path, lock: FileLock) -> bool:
-    """Apply the journal beside ``path``; return True if there was one.
+    """Apply the journal next to ``path``; return True if there was one.
 
     The caller holds ``lock`` on the file. Raises ``InputError`` if another file has that name by
     now, and ``OSError``.

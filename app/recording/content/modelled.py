@@ -1,4 +1,4 @@
-"""The displacement of an overlay model, written beside the counts of a run as it is computed.
+"""The displacement of an overlay model, written next to the counts of a run as it is computed.
 
 Single precision is enough for values that are plotted: it resolves 0.1 nm in a millimetre.
 """

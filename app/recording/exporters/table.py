@@ -47,7 +47,7 @@ class Exporter:
         Writes a recording to a path, which does not exist yet. May raise ``InputError``.
     describes : bool
         True if the file has the description of the recording too. Otherwise it is written to a
-        file beside it.
+        file next to it.
     """
 
     title: str

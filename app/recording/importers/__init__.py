@@ -1,7 +1,7 @@
 """Importers of measured data: one file for each format, one line here.
 
 Another distribution adds a format through an entry point in the group ``dearig.importers``.
-``README.md`` beside this file shows how.
+``README.md`` next to this file shows how.
 """
 
 from __future__ import annotations

@@ -358,7 +358,7 @@ def _of_actuator(
 ) -> Film | None:
     """Return the film of an actuator, held as ``kinematics`` says, and say what is assumed.
 
-    Changes ``noted``, the provenance: values of the film that nobody gave are named there.
+    Changes ``noted``, the provenance: values of the film that no one gave are named there.
     """
     if kinematics is not None:
         if film is None:

@@ -82,18 +82,18 @@ class Source(Protocol):
     """Columns of numbers in a file.
 
     A source may have more, which is used where it is there: ``units`` and ``labels``, what the file
-    says of columns beside their names; ``own_name(column)``, its name without a group or path;
+    says of columns next to their names; ``own_name(column)``, its name without a group or path;
     ``places``, columns by their numbers from 1; ``tables``, the columns of each specimen, sheet or
     group; ``size(column)``, its number of values; ``step_s(columns)``, the time in s from row to
     row, or None, and ``step_from``, the name that it is from; ``cell(index, column)``, the text in
-    the file for a value that is no number; ``block``, the cells of the lines above a table;
-    ``scales``, scales that stand beside the values of columns, which may contain them or not;
+    the file for a value that is not a number; ``block``, the cells of the lines above a table;
+    ``scales``, scales that stand next to the values of columns, which may contain them or not;
     ``rows(indices)``, the places of several samples at once;
     ``skipped``, the rows before each one that was left out, and its place in words;
     ``is_finite``, True if ``read`` returns finite numbers only; ``cut_short``, True if columns may
     end early; ``notes``, sentences on what was found; ``progress``, a callable that can be set,
     which gets the part of ``read`` that is done; ``optional``, columns that can be set, for which
-    ``read`` raises ``GapError`` where a cell is no number; ``overview(names, count)``, the
+    ``read`` raises ``GapError`` where a cell is not a number; ``overview(names, count)``, the
     ``Overview`` of columns, in one reading; ``began(column)``, the date and time from which a
     column of time counts, or None; ``started``, that of the first row where no column has it.
     """

@@ -1,4 +1,4 @@
-"""Tags of recordings, in a small file beside them: a finished recording stays as it was written.
+"""Tags of recordings, in a small file next to them: a finished recording stays as it was written.
 
 The file ``dearig-tags.json`` of a folder names its recordings by file name and identifier, so that
 tags stay with a recording that is renamed, and do not go over to another one of the same name.

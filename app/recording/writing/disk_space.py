@@ -25,7 +25,7 @@ FIXED = 200_000
 PER_COUNT = 1.0 + 2.0 / 64.0 + 2.0 / 4096.0 + 0.001
 
 #: Bytes of a deflated physical value of a noise over the whole range of the converter, and of the
-#: time of a sample at a rate that is no decimal number, with 10 % more.
+#: time of a sample at a rate that is not a decimal number, with 10 % more.
 VALUE, TIME = 7.3, 7.0
 
 #: Error number of the operating system: what happened, and what to do.

@@ -37,7 +37,7 @@ def add_event(path: str | Path, level: str, message: str) -> None:
     path = Path(path)
     if reason := why_no_file(path):
         raise InputError(f"{path} {reason}")
-    path = path.resolve()  # the journal is beside the file itself
+    path = path.resolve()  # the journal is next to the file itself
     recording = open_recording(path)
     try:
         if not is_finished(path):

@@ -1,6 +1,6 @@
 """The file of a run that another program deletes, replaces, moves or overwrites.
 
-The run has the file open, so on most systems its content outlives its name. Windows lets nobody
+The run has the file open, so on most systems its content outlives its name. Windows lets no one
 delete or rename a file that is open.
 """
 
@@ -51,9 +51,9 @@ def find_loss(lock: FileLock, path: Path, size: int, mark: tuple[int, bytes]) ->
 
 
 def rescued(lock: FileLock, path: Path) -> tuple[Path, FileLock]:
-    """Return path and lock of the content of ``lock``'s file, which is no more at ``path``.
+    """Return path and lock of the content of ``lock``'s file, which is no longer at ``path``.
 
-    That is the file itself where it was moved to, if the system tells, or else a copy beside
+    That is the file itself where it was moved to, if the system tells, or else a copy next to
     ``path``. Raises ``OSError`` where it cannot be copied.
     """
     place = _place(lock)
@@ -74,7 +74,7 @@ def rescued(lock: FileLock, path: Path) -> tuple[Path, FileLock]:
 
 
 def free_name(path: Path, word: str) -> Path:
-    """Return a name beside ``path`` that no file has: ``run-saved.h5``, ``run-saved-2.h5``."""
+    """Return a name next to ``path`` that no file has: ``run-saved.h5``, ``run-saved-2.h5``."""
     for number in count(1):
         ending = word if number == 1 else f"{word}-{number}"
         name = path.with_name(f"{path.stem}-{ending}{path.suffix}")
@@ -84,7 +84,7 @@ def free_name(path: Path, word: str) -> Path:
 
 
 def _place(lock: FileLock) -> Path | None:
-    """Return the present path of the file of ``lock``, None if it has none or nobody tells."""
+    """Return the present path of the file of ``lock``, None if it has none or no one tells."""
     try:
         if sys.platform == "linux":
             place = Path(f"/proc/self/fd/{lock.fd}").readlink()

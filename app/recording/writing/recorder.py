@@ -39,7 +39,7 @@ _THREAD = "recording"
 
 
 def is_writing() -> bool:
-    """Return True while a recorder's thread lives, also one whose end nobody waits for any more.
+    """Return True while a recorder's thread lives, also one whose end no one waits for any more.
 
     Python and HDF5 wait for it when they exit, which does not end on a disk that does not answer.
     """
@@ -70,7 +70,7 @@ class Recorder:
     ``waits`` the rig waits for its reader, as a simulated rig without a real clock: a full queue
     then delays ``append`` while the disk takes data and ``hurried`` is False. ``clock`` returns s.
     With ``new_file`` a file that another program deletes, replaces, moves or overwrites is no
-    fault: the recording goes on in a new one beside it.
+    fault: the recording goes on in a new one next to it.
     """
 
     def __init__(

@@ -419,7 +419,7 @@ class RecordingWriter:
         return self._lost
 
     def continued(self, first_sample: int) -> RecordingWriter:
-        """Return the writer of a new file beside, for the samples from ``first_sample`` on.
+        """Return the writer of a new file next to it, for the samples from ``first_sample`` on.
 
         Raises ``InputError`` where no file can be created.
         """
@@ -535,7 +535,7 @@ class RecordingWriter:
 
         ``outcome`` is a sentence on how the run ended, ``output_state`` what was known of the rig's
         output after it. A file that is no more in its place is
-        finished where it is, or as a copy beside; ``path`` is that one then. Raises ``DiskFault``
+        finished where it is, or as a copy; ``path`` is that one then. Raises ``DiskFault``
         if the physical values cannot be written, with the counts in the file, and if the finished
         file is not what was written; ``LostFile`` if ``look`` has not told of it.
         """
@@ -564,8 +564,8 @@ class RecordingWriter:
                 self._path, lock = rescued(self._lock, self._path)
             except (OSError, InputError) as error:
                 raise DiskFault(
-                    f"{self._lost}; it could not be saved beside ({in_words(error)}), and what was "
-                    f"recorded is lost"
+                    f"{self._lost}; no copy could be saved ({in_words(error)}), and what "
+                    f"was recorded is lost"
                 ) from error
         try:
             with lock:

@@ -54,7 +54,7 @@ _LEGEND_TWO = 4.0
 def parameters_figure(fit: Identification) -> Figure:
     """Draw every parameter with its 95 % interval; open ends are arrows, undetermined ones grey.
 
-    The thesis's Table 3 is drawn beside a network with as many branches.
+    The thesis's Table 3 is drawn next to a network with as many branches.
     """
     groups = _groups(fit)
     rows = [len(g) for g in groups.values()]

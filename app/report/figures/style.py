@@ -123,7 +123,7 @@ def envelope(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return a band from ``low`` to ``high`` (N,) over ``x`` in at most ``columns`` columns.
 
-    Each has the lowest and the highest end of its samples. NaN is no sample.
+    Each has the lowest and the highest end of its samples. NaN is not a sample.
     """
     starts = np.unique(np.linspace(0, x.size, columns, endpoint=False).astype(int))
     return x[starts], np.fmin.reduceat(low, starts), np.fmax.reduceat(high, starts)

@@ -218,7 +218,7 @@ def write_page(
         return write_pdf(page(), path)
     text = page()
     with replaced_when_done(path, overwrite=True) as partial:
-        # bytes of a file name that are no text are shown as ?
+        # bytes of a file name that are not text are shown as ?
         partial.write_text(text, encoding="utf-8", errors="replace", newline="\n")
     return path
 

@@ -54,7 +54,7 @@ def check_browser() -> str:
     if asked:
         found = shutil.which(asked)
         if found is None:
-            raise InputError(f"{BROWSER} names {asked}, which is no program that can be started")
+            raise InputError(f"{BROWSER} names {asked}, which is not a program that can be started")
         return found
     for name in (*_NAMES, *(os.path.expandvars(place) for place in _PLACES)):
         found = shutil.which(name)
@@ -70,7 +70,7 @@ def check_browser() -> str:
 def print_report(report: str | Path, out: str | Path, overwrite: bool = False) -> Path:
     """Print the report in the HTML file ``report`` to the PDF file ``out``; return its path.
 
-    Raises ``InputError`` for a file that is no report of this program, or that cannot be printed.
+    Raises ``InputError`` for a file that is not a report of this program, or cannot be printed.
     """
     from dearig.recording.files import check_output
 
@@ -79,7 +79,7 @@ def print_report(report: str | Path, out: str | Path, overwrite: bool = False) -
     try:
         page = read_input(report, "report", _LARGEST).decode("utf-8")
     except ValueError as error:
-        raise InputError(f"the report {report} cannot be read: it is no text") from error
+        raise InputError(f"the report {report} cannot be read: it is not text") from error
     return write_pdf(page, out, overwrite, str(report))
 
 
@@ -92,7 +92,7 @@ def write_pdf(page: str, out: Path, overwrite: bool = True, name: str = "the rep
 
     check_page(page, name)
     browser = check_browser()
-    # beside the result and not in the folder for temporary files: a browser from a snap or a
+    # next to the result and not in the folder for temporary files: a browser from a snap or a
     # flatpak is not allowed to see that
     with (
         tempfile.TemporaryDirectory(prefix="dearig-pdf-", dir=out.parent) as folder,

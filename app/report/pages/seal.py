@@ -1,7 +1,7 @@
 """What tells a report of this program from any other page, and what such a page may hold.
 
 A checksum at its end shows that a page is whole and unchanged. Anyone can compute it, so it
-allows nothing by itself: the beginning has to hold the content policy of reports, before anything
+allows nothing on its own: the beginning has to hold the content policy of reports, before anything
 else can act, and every element has to be one that reports have. None of them loads or runs
 anything.
 """
@@ -44,7 +44,7 @@ _OPENED = re.compile(r"<(?:/?([A-Za-z][^\s/>]*)|([!?/]))")
 
 def sealed(page: str) -> str:
     """Return the ``page`` of a report with its checksum at the end."""
-    # bytes of a file name that are no text are shown as ?
+    # bytes of a file name that are not text are shown as ?
     page = page.encode("utf-8", "replace").decode("utf-8")
     return page + _SEAL.format(_digest(page))
 
@@ -57,7 +57,7 @@ def check_page(page: str, name: str) -> None:
     seal = _SEALED.search(page)
     if seal is None or not page.startswith(_HEAD):
         raise InputError(
-            f"{name} is no report of this program, or one of an earlier version; give the "
+            f"{name} is not a report of this program, or one of an earlier version; give the "
             f"page of a fit or a diagnosis, such as report.html, or write the report again",
             option="report",
         )

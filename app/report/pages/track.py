@@ -217,7 +217,7 @@ def runs_figure(outcome: TrackOutcome) -> Figure:
 
 
 def errors_figure(outcome: TrackOutcome) -> Figure:
-    """Draw the error of every run of the model, from iteration to iteration, beside the others."""
+    """Draw the error of every run of the model, from iteration to iteration, next to the others."""
     ours = [r for r in outcome.runs if r.kind in ("model", "learned")]
     with style():
         figure = blank(WIDTH, 2.6)

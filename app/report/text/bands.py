@@ -26,7 +26,7 @@ _NAMED = 3  # recordings that are named
 def band_texts(band: PredictionBand, kind: str, error: np.ndarray | None = None) -> tuple[str, ...]:
     """Return sentences on a ``band`` of a recording of ``kind``.
 
-    ``error`` (N,) in m or Pa is measured less model, where that is known; NaN is no reading.
+    ``error`` (N,) in m or Pa is measured less model, where that is known; NaN is not a reading.
     """
     from dearig.analysis.readings.band import TRAINING
 

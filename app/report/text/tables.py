@@ -61,7 +61,7 @@ class Table:
 
     @property
     def is_wide(self) -> bool:
-        """True if a phone has no room for the columns beside the longest word of the first."""
+        """True if a phone has no room for the columns next to the longest word of the first."""
         columns = zip(*(row.cells for row in self.rows), strict=False)
         widths = [
             max(

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SIMULATED_CAVEAT", "table_3"]
 
-#: Beside every comparison of errors on simulated recordings with the thesis's measured errors.
+#: Next to every comparison of errors on simulated recordings with the thesis's measured errors.
 SIMULATED_CAVEAT = (
     "These recordings are simulated. The thesis's errors are of a measured film, so the comparison "
     "does not show how well the model describes a real film."

@@ -332,7 +332,7 @@ byId("span-recent").addEventListener("click", () => choose("recent"));
 byId("span-whole").addEventListener("click", () => choose("whole"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { layout = ""; });
 window.addEventListener("resize", () => { fresh = true; });
-// a browser has few connections to one server: a page that nobody sees needs none
+// a browser has few connections to one server: a page that no one sees needs none
 document.addEventListener("visibilitychange", () => (document.hidden ? disconnect() : connect()));
 connect();
 requestAnimationFrame(draw);

@@ -39,7 +39,7 @@ _WORDS = EditorWords(
     what="plan",
     caption="Pl&an",
     tip="Sequence, grid of its keys, repeats, rests, order, and what is computed after each run",
-    open_tip="Read a plan file; sequence files that it names lie beside it",
+    open_tip="Read a plan file; sequence files that it names lie next to it",
     example_tip="Replace the plan by a commented one with every key",
     kinds="Plans (*.toml)",
 )
@@ -118,7 +118,7 @@ class OpenedCampaign:
 
 
 def write_report(folder: Path, progress: Progress = quiet) -> Path:
-    """Write the report of the campaign in ``folder`` beside its journal."""
+    """Write the report of the campaign in ``folder`` next to its journal."""
     progress("writing the report", 0.0)
     return write_campaign_report(seen(folder), folder / "report.html")
 

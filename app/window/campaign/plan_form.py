@@ -61,15 +61,15 @@ def _inline(value: Any) -> str:
 
 
 def read_values(text: str) -> list[Any]:
-    """Return the values in a typed ``text``. Raises ``InputError`` for what is no list of them."""
+    """Return the values in a typed ``text``. Raises ``InputError`` for what is not a list."""
     try:
         tables = tomllib.loads(f"v = [{text}]")
     except tomllib.TOMLDecodeError:
         tables = {}
     if list(tables) != ["v"]:
         raise InputError(
-            f"{text!r} is no list of values: write numbers with commas between them, as 6, 7, and "
-            f"lists in brackets, as [6, 6], [7, 7]"
+            f"{text!r} is not a list of values: write numbers with commas between them, as 6, 7, "
+            f"and lists in brackets, as [6, 6], [7, 7]"
         )
     values = tables["v"]
     if not values:
@@ -134,7 +134,7 @@ class PlanForm(QScrollArea):
             plan = tomllib.loads(toml)
         except tomllib.TOMLDecodeError as error:
             self._enable(False)
-            self.trouble.show_text(f"The text is no TOML, correct it there: {error}")
+            self.trouble.show_text(f"The text is not TOML, correct it there: {error}")
             return
         self._enable(True)
         self.trouble.show_text("")

@@ -13,7 +13,7 @@ from dearig.window.session.state import Session
 
 __all__ = ["PresentRun"]
 
-_FRAME = 33  # ms between two frames: half of those of the page Run, beside a table
+_FRAME = 33  # ms between two frames: half of those of the page Run, next to a table
 _NUMBERS = 100  # ms between two updates of the readouts: faster ones cannot be read
 _SHOWN = ("voltage", "displacement")
 

@@ -35,7 +35,7 @@ class Draft:
     """Tables of a sequence file and its text, with undo and redo.
 
     ``data`` holds ``name``, ``lead_in_s``, ``tail_s`` and the list ``segment``. The text is edited
-    in place: comments stay, and what nobody changes stays to the letter. ``undo`` goes back to the
+    in place: comments stay, and what no one changes stays to the letter. ``undo`` goes back to the
     file that was open before, too.
     """
 

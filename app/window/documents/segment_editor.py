@@ -69,7 +69,7 @@ class SequenceEditor(QWidget):
     ) -> None:
         super().__init__(parent)
         self._forms = forms or sequence_forms()
-        self._explain = explain  # beside the fields, not only in their tooltips
+        self._explain = explain  # next to the fields, not only in their tooltips
         self.draft = Draft(toml, file)
         self.form: Form | None = None
         self._form_of: tuple[int, str] | None = None  # row and kind

@@ -124,7 +124,7 @@ def measure_hold(
 
 
 def write_hold_report(outcome: HoldOutcome, progress: Progress = quiet) -> Path:
-    """Write the report of a hold beside its recording, and return its path."""
+    """Write the report of a hold next to its recording, and return its path."""
     progress("writing the report", 0.0)
     return HoldResult(outcome).to_html(outcome.recording.with_suffix(".html"))
 

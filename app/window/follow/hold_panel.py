@@ -58,7 +58,7 @@ _OPTIONS = (
     ("rate_limit", "Ra&te", 0.01, 100.0, 2, " %/s", 0.01,
      "Largest change of the correction; the gate enforces it"),
     ("response", "Re&sponse", 0.2, 3600.0, 1, " s", 1.0,
-     "Response time of the loop, beside its delay"),
+     "Response time of the loop, next to its delay"),
     ("laser_loss", "&Laser loss", 0.2, 600.0, 1, " s", 1.0,
      "Time without usable readings, after which the voltage is ramped down"),
 )  # fmt: skip
@@ -176,7 +176,7 @@ class HoldPanel(QWidget):
 
     @Slot()
     def open_report(self) -> None:
-        """Write the report beside the recording, and open it in the browser."""
+        """Write the report next to the recording, and open it in the browser."""
         if self._outcome is not None and self._job is None:
             self._submit(self.worker.submit(write_hold_report, self._outcome), self._report_written)
 
@@ -361,7 +361,7 @@ class HoldPanel(QWidget):
         )
         self.run_button.clicked.connect(self.show_on_run)
         self.report_button = button(
-            "Open re&port", "Write the report beside the recording and open it in the browser"
+            "Open re&port", "Write the report next to the recording and open it in the browser"
         )
         self.report_button.clicked.connect(self.open_report)
         self.state = Message()

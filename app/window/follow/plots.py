@@ -109,7 +109,7 @@ class FollowPlots(QWidget):
 
 
 class ErrorPlot(QWidget):
-    """The error of every run, from iteration to iteration, beside the noise of a reading."""
+    """The error of every run, from iteration to iteration, next to the noise of a reading."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)

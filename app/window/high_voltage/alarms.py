@@ -50,7 +50,7 @@ class Alarm:
 
     @property
     def pending(self) -> bool:
-        """True for a warning or fault that nobody has acknowledged."""
+        """True for a warning or fault that no one has acknowledged."""
         return self.level != "info" and not self.acknowledged
 
 
@@ -77,7 +77,7 @@ class AlarmLog(QObject):
 
     @property
     def pending(self) -> int:
-        """Number of warnings and faults that nobody has acknowledged."""
+        """Number of warnings and faults that no one has acknowledged."""
         return sum(alarm.pending for alarm in self._alarms)
 
     def add(

@@ -25,7 +25,7 @@ from dearig.window.kit.widgets import button, label
 __all__ = ["JobControls", "result_side", "splitter"]
 
 _PARTS = 1000  # of the bar of progress
-_HEADLINE = 300  # px that a headline has beside its buttons, at least
+_HEADLINE = 300  # px that a headline has next to its buttons, at least
 
 
 def splitter(orientation: Qt.Orientation, *parts: QWidget, growing: int | None = None) -> QSplitter:
@@ -60,7 +60,7 @@ def result_side(
 
 
 class _Head(QWidget):
-    """Headline, and beside it buttons, or below it where they would leave it too little width."""
+    """Headline, and next to it buttons, or below it where they would leave it too little width."""
 
     def __init__(self, headline: QLabel, buttons: Sequence[QPushButton]) -> None:
         super().__init__()

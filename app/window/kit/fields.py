@@ -108,7 +108,7 @@ class Typed:
 def read_typed(field: FormField, text: str) -> Typed:
     """Return the value of the typed ``text``; None for an empty field.
 
-    A text that is no number keeps its place in the file, whose check refuses it too.
+    A text that is not a number keeps its place in the file, whose check refuses it too.
     """
     text = text.strip()
     if not text:
@@ -142,7 +142,7 @@ def read_back(field: FormField, value: Any) -> str:
 
 @cache
 def _keys() -> re.Pattern[str]:
-    """Return a pattern of the keys of sequences and rig files that are no words by themselves."""
+    """Return a pattern of the keys of sequences and rig files that are not words by themselves."""
     tables = [*SECTIONS.values(), *SEGMENT_KINDS.values()]
     keys = {*HEAD_FIELDS, *(key for table in tables for key in table.model_fields)}
     keys |= set(map(millimetre_key, keys))  # of targets

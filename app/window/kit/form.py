@@ -23,7 +23,7 @@ class Form(QWidget):
     """Edits ``fields``; ``changed`` carries key and value after each key press.
 
     Below a list, and below a number that is typed, stands what was read from the text. A text that
-    is no number is carried as it is, and its fault is shown in place of those that are found later.
+    is not a number is carried as it is, and its fault is shown in place of those found later.
     """
 
     changed = Signal(str, object)

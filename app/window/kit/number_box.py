@@ -1,8 +1,8 @@
 """Fields of a number with arrows, whose text means the same in every language of the system.
 
 Qt's own fields leave out a sign that is not the language's decimal one when they read a text: 0.5
-typed on a German computer is 5. Here a text that is no number, is ambiguous or outside the limits
-is shown as it is typed and marked; when the field is left, the last number is shown again.
+typed on a German computer is 5. Here a text that is not a number, is ambiguous or outside the
+limits is shown as it is typed and marked; when the field is left, the last number is shown again.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class NumberBox(QDoubleSpinBox):
         self.editingFinished.connect(self._mark)
 
     def value(self) -> float:
-        """Return the number that is shown; the last one where the text is no number."""
+        """Return the number that is shown; the last one where the text is not a number."""
         self.interpretText()
         self._mark()
         return super().value()
@@ -78,5 +78,5 @@ class WholeBox(NumberBox):
         super().__init__(low, high, value, decimals=0)
 
     def value(self) -> int:
-        """Return the number that is shown; the last one where the text is no whole number."""
+        """Return the number that is shown; the last one where the text is not a whole number."""
         return int(super().value())

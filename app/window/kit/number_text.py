@@ -27,7 +27,7 @@ _SHOWN = 40
 
 
 class NumberTextError(ValueError):
-    """A typed text that is no number, or more than one; the message says how to write it."""
+    """A typed text that is not a number, or more than one; the message says how to write it."""
 
 
 def read_number(text: str, whole: bool = False) -> float:
@@ -79,7 +79,7 @@ def _between_semicolons(text: str) -> list[str]:
         items.pop()
     for item in items:
         if not item:
-            raise NumberTextError("a value is missing beside a semicolon: write 6.5; 7")
+            raise NumberTextError("a value is missing next to a semicolon: write 6.5; 7")
         if not _NUMBER.fullmatch(item) and re.search(r"[\s,]", item):
             if _GROUPED.fullmatch(item):
                 continue  # read_number says more
@@ -106,7 +106,7 @@ def _between_spaces(text: str) -> list[str]:
                 f"{_shown(word)}: this comma may be a decimal comma or separate two values: write "
                 f"0{word}, or separate the values by semicolons"
                 if word[1:2].isdigit()
-                else "a value is missing beside a comma: write 6.5; 7"
+                else "a value is missing next to a comma: write 6.5; 7"
             )
         if len(words) > 1 and len(_COMMA.findall(word)) > 1:
             raise NumberTextError(_two_readings(word))

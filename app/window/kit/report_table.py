@@ -23,7 +23,7 @@ __all__ = ["ReportTable", "two_columns"]
 _NUMBER = re.compile(
     r"[(<]?[-\N{MINUS SIGN}\N{EN DASH}\N{INFINITY}+]?\d|[-\N{EN DASH}\N{INFINITY}]$"
 )
-_NARROW = ("Recording", "Level")  # columns that hold a word, beside columns of sentences
+_NARROW = ("Recording", "Level")  # columns that hold a word, next to columns of sentences
 
 
 def two_columns(title: str, rows: tuple[tuple[str, str], ...]) -> Table:

@@ -116,7 +116,7 @@ def card(layout: QLayout) -> QFrame:
 
 
 class Message(QLabel):
-    """A message beside what it is about; hidden while it is empty."""
+    """A message next to what it is about; hidden while it is empty."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -32,7 +32,7 @@ _READOUT = 100  # ms between two readouts of a curve that changes: faster ones c
 _STEP = 0.25  # of the visible range, moved by an arrow key
 _ZOOM_KEY = 0.8  # of the range, for one press
 _HISTORY_MAX = 50
-_PADDING = 0.02  # of the range, beside curves that are not over time
+_PADDING = 0.02  # of the range, next to curves that are not over time
 
 
 @dataclass(frozen=True)

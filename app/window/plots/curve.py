@@ -104,7 +104,7 @@ class PlotCurve(pg.PlotCurveItem):
     # drawing
 
     def viewRangeChanged(self) -> None:  # noqa: N802
-        """Choose the points anew for another range or width of the plot."""
+        """Choose the points again for another range or width of the plot."""
         self._draw(force=False)
 
     def cut_at_edges(self, cut: bool) -> None:

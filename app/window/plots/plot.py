@@ -22,7 +22,7 @@ _SAMPLE = 18.0  # px, length of a line in the key
 _GAP = 5.0  # px between the line and its name
 _BETWEEN = 16.0  # px between two entries
 _KEY_POINTS = 9.0  # pt, size of the text of keys and labels
-_LEAST_POINTS = 7.0  # pt, of a label beside a low plot
+_LEAST_POINTS = 7.0  # pt, of a label next to a low plot
 _CUT = "\N{HORIZONTAL ELLIPSIS}"
 _DAY = 86_400.0  # s
 _FEW_DECADES = 2.5  # below this, powers of ten alone are too few labels
@@ -138,7 +138,7 @@ class Plot(pg.PlotItem):
     def _show_label(self, side: str) -> None:
         """Show the label of an axis.
 
-        Beside a plot that is too low for it, it has two lines, then smaller letters, and at last
+        Next to a plot that is too low for it, it has two lines, then smaller letters, and at last
         fewer of them: it must not run into the label of the next plot.
         """
         text = self.axis_texts[side]
@@ -262,7 +262,7 @@ class Plot(pg.PlotItem):
         return curves + self._entries + note
 
     def renew_key(self, values: tuple[str, ...] = ()) -> None:
-        """Draw the key anew; ``values`` follow the names of the curves, in the order of these."""
+        """Draw the key again; ``values`` follow the names of the curves, in the order of these."""
         self.key.show_entries(self.entries(), values)
 
     def restyle(self, theme: Theme) -> None:

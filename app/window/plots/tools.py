@@ -97,7 +97,7 @@ class PlotTools(QWidget):
         return QSize(self.opener.sizeHint().width(), self.opener.sizeHint().height())
 
     def _fit(self) -> None:
-        """Show the buttons for which there is room beside the readout."""
+        """Show the buttons for which there is room next to the readout."""
         left = self.width() - _READOUT_LEAST - self.opener.sizeHint().width() - SPACE // 2
         for action, button in self.buttons.items():
             wanted = action.isVisible()

@@ -97,7 +97,7 @@ def _text_column(key: str) -> ListColumn:
         return " ".join(summary.texts.get(key, "").split())
 
     field = TEXTS[key]
-    # 8 px a character, and 2 px beside them
+    # 8 px a character, and 2 px next to them
     width = 8 * field.characters + 2
     return ListColumn(field.label, field.tip, width, text, shown=field.shown, wide=field.wide)
 
@@ -115,7 +115,7 @@ def _rms(summary: RecordingSummary) -> str:
 
 
 def _ended(summary: RecordingSummary) -> str:
-    # a sign beside the colour, for readers who cannot tell the colours apart
+    # a sign next to the colour, for readers who cannot tell the colours apart
     level, words = how_it_ended(summary)
     sign = {"fault": "\N{MULTIPLICATION X}", "warning": "!"}.get(level, "\N{CHECK MARK}")
     return f"{sign} {words}"
@@ -378,7 +378,7 @@ def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
         if summary.unfit:
             return summary.unfit
         if summary.fitted:
-            return "The model was fitted to this recording; this error is no validation"
+            return "The model was fitted to this recording; this error is not validation"
         return COLUMNS[column].tip
     if column == ENDED:
         told = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in summary.events]

@@ -61,7 +61,7 @@ class RecordingAnalysis(QObject):
                 self._submit("spectrum", self._take_spectra, spectra, path, model, drive)
 
     def forget(self) -> None:
-        """Compute everything anew when it is asked for next: the recordings have changed."""
+        """Compute everything again when it is asked for next: the recordings have changed."""
         self._asked.clear()
 
     def _take_spectra(self, found: Spectra) -> None:

@@ -166,7 +166,7 @@ class RecordingsTable(QTableView):
 
     @Slot()
     def _reselect(self) -> None:
-        """Select again what was selected before the rows were arranged anew."""
+        """Select again what was selected before the rows were arranged again."""
         before = self._chosen
         with QSignalBlocker(self):
             self.choose(before)

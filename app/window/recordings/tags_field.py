@@ -27,8 +27,8 @@ class TagsField(QLineEdit):
         self.setPlaceholderText("good, new grease")
         self.setToolTip(
             "Tags of the selected recordings, separated by commas; of several, those that all have "
-            "(Ctrl+T). They are kept in dearig-tags.json beside the recordings, which stay as they "
-            "are"
+            "(Ctrl+T). They are kept in dearig-tags.json next to the recordings, which stay as "
+            "they are"
         )
         self.editingFinished.connect(self._typed)
 

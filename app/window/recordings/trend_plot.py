@@ -138,7 +138,7 @@ class TrendPlot(QWidget):
         value = np.array([row[1] for row in self._found])
         levels = np.array([how_it_ended(row[2])[0] for row in self._found])
         marked = np.array([row[2].path in self._chosen for row in self._found])
-        # the runs of several films are no series
+        # the runs of several films are not a series
         if len({row[2].film for row in self._found}) == 1:
             self.plot.add_curve("all runs", theme.muted, in_key=False).set_points(time, value)
         self.plot.add_curve(

@@ -55,7 +55,7 @@ _KINDS = ("sim", "hidden", "local", "remote")
 
 
 class RigPage(Page):
-    """Chooses and checks the rig, and edits the rig file with faults beside their fields."""
+    """Chooses and checks the rig, and edits the rig file with faults next to their fields."""
 
     title = "Rig"
     at_start = True
@@ -268,7 +268,7 @@ class RigPage(Page):
         )
 
     def _block_arming(self, faults: dict[tuple[str, str], str]) -> None:
-        """Block arming while the rig file has faults: a limit typed beside them is not in force."""
+        """Block arming while the rig file has faults: nothing that is typed then is in force."""
         if not faults:
             self.session.unblock(_BLOCK)
             return

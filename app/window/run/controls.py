@@ -44,7 +44,7 @@ class StepButton(QPushButton):
 
     It takes no focus, and no other key acts on it: Space is a stop key, and a key that is held
     repeats itself. What was pressed while the window did not answer is dropped, and ``dropped``
-    says so: nobody has seen what it would act on.
+    says so: no one has seen what it would act on.
     """
 
     dropped = Signal(str)

@@ -231,7 +231,7 @@ class RunDisplay(QWidget):
     def _span_changed(self) -> None:
         self.plots.span_s = self.view.span.currentData()
         if not self.view.shows_plan:
-            self.plots.area.follow()  # draws anew
+            self.plots.area.follow()  # draws again
 
     @Slot()
     def _view_changed(self) -> None:

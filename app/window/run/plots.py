@@ -53,8 +53,8 @@ _ROOM = 0.05  # of a range, above and below its curves
 class RunPlots(QWidget):
     """Draws a plan, or the last ``span_s`` s of a ``Live`` (the whole run if that is None).
 
-    ``digest`` is that of the waveform whose curves are drawn, "" where that is no plan that may be
-    played. When the operator looks at another time, ``following`` is False until he follows again.
+    ``digest`` is that of the waveform whose curves are drawn, "" where that is not a plan that may
+    be played. When the operator looks at another time, ``following`` is False for so long.
     """
 
     shown_changed = Signal()  #: plots were shown or hidden

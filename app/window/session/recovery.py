@@ -135,7 +135,7 @@ def _unsaved(file: EditedFile, text: str) -> UnsavedText:
 
 
 def unsaved_folder(settings: QSettings) -> Path:
-    """Return the folder of the recovery files: beside the settings, where these are a file."""
+    """Return the folder of the recovery files: next to the settings, where these are a file."""
     file = Path(settings.fileName())
     if os.name == "nt" and settings.format() != QSettings.Format.IniFormat:  # the registry
         file = (

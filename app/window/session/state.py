@@ -54,7 +54,7 @@ class Preview:
     ``curves`` are (time in s, value in SI units) of voltage, displacement and field, decimated with
     their extremes kept; ``segments`` are label, begin and end in s, with lead-in and tail.
     ``faults`` are those of the rows and fields of the sequence, all of them. An outline has the
-    curves of a plan by kernels that are not compiled, and its name as ``sentence``; it is no plan.
+    curves of a plan by kernels that are not compiled, its name as ``sentence``, and is not a plan.
     """
 
     toml: str
@@ -312,7 +312,7 @@ class Session(QObject):
     def block(self, key: str, sentence: str, page: str = "") -> None:
         """Refuse to arm until ``unblock``; a rig that is armed is disarmed.
 
-        The ``sentence`` stands beside the Arm button, and on a banner of every page where ``page``
+        The ``sentence`` stands next to the Arm button, and on a banner of every page where ``page``
         is given, the title of the page that mends it.
         """
         wanted = ArmingBlock(sentence, page)

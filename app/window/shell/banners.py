@@ -91,7 +91,7 @@ class Banners(QWidget):
 
     @Slot()
     def _show_all(self) -> None:
-        """Show every banner with its whole text in a list that closes by itself."""
+        """Show every banner with its whole text in a list that closes on its own."""
         shown = QFrame(self, Qt.WindowType.Popup)
         shown.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         shown.setProperty("role", "card")

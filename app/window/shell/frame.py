@@ -99,7 +99,7 @@ class MainWindow(QMainWindow):
         # after the last of several moves, such as those of a drag
         self._moved = QTimer(self, singleShot=True, interval=_SETTLING)
         self._moved.timeout.connect(self._keep_stop_in_reach)
-        self._by_signal = False  # closed by a signal: nobody is there to be asked
+        self._by_signal = False  # closed by a signal: no one is there to be asked
         self._connect()
         self.idle_pages = IdlePages(session, self._make_next_page, self)
         self._apply_colour_scheme()
@@ -112,7 +112,7 @@ class MainWindow(QMainWindow):
 
     @property
     def pages(self) -> tuple[Page, ...]:
-        """All pages in the order of the list; those that nobody has needed yet are made."""
+        """All pages in the order of the list; those that no one has needed yet are made."""
         return tuple(map(self.page, PAGES))
 
     def page(self, kind: type[P]) -> P:

@@ -272,7 +272,7 @@ class TrainingTable(QTableWidget):
         if item.column() not in (_TRAIN, _VALIDATE):
             return  # a name or its tip
         if item.checkState() == Qt.CheckState.Checked:
-            # an error on training data is no validation: a recording is one or the other
+            # an error on training data is not validation: a recording is one or the other
             other = self._item(item.row(), _VALIDATE + _TRAIN - item.column())
             other.setCheckState(Qt.CheckState.Unchecked)
         self.changed.emit()

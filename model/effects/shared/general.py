@@ -126,7 +126,7 @@ class Weights:
     bounds: tuple[float, float]
     meaning: str  # ends before the number
     typical: float
-    stands_for: str  # the same beside the equation, for any number
+    stands_for: str  # the same next to the equation, for any number
 
     def parameters(self, count: int) -> tuple[Parameter, ...]:
         """Return ``count`` amplitudes, numbered from 1."""

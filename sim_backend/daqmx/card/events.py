@@ -47,7 +47,7 @@ def check_registration(
 
 
 def check_intervals(task: Task, buffer: int) -> None:
-    """Refuse the start of ``task`` if its ``buffer`` is no multiple of an event's interval."""
+    """Refuse the start of ``task`` if its ``buffer`` is not a multiple of an event's interval."""
     for listener in task.listeners:
         if listener.every is None or listener.signal is not None:
             continue

@@ -49,7 +49,7 @@ class Sensor:
     usage: int
     values: dict[str, Any]
     scaled_units: str
-    name: str = field(default="", init=False)  # a sensor is no custom scale
+    name: str = field(default="", init=False)  # a sensor is not a custom scale
 
     def scaled(self, volts: np.ndarray) -> np.ndarray:
         """Return the measured quantity for ``volts`` (n,)."""

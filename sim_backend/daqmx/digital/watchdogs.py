@@ -63,7 +63,7 @@ class Watchdogs:
                 watchdog.expired = True
                 for line, level in watchdog.states.items():
                     if level != NO_CHANGE:
-                        # a line that nobody drives is pulled down by the card
+                        # a line that no one drives is pulled down by the card
                         self._levels.put(line, level == HIGH, at)
 
     def next_expiry(self) -> float:

@@ -44,7 +44,7 @@ Call = Callable[[Any, Any], Any]
 
 
 class _Garbage:
-    """Stands for a request that is no message of the protocol."""
+    """Stands for a request that is not a message of the protocol."""
 
 
 class _Places:
@@ -70,7 +70,7 @@ class _Places:
 
 
 class Interceptor(grpc.ServerInterceptor):
-    """Interceptor of the calls to ``device``; ``clients`` is None where nobody tracks them.
+    """Interceptor of the calls to ``device``; ``clients`` is None where no one tracks them.
 
     ``link`` is the clock of the faults of the link, ``closing`` is set when the server closes.
     """
@@ -200,9 +200,9 @@ def _abort(context: grpc.ServicerContext, code: grpc.StatusCode, words: str) -> 
 
 
 def _check(name: str, request: Any) -> None:
-    """Refuse a request that is no message, or whose reply or texts would be too large."""
+    """Refuse a request that is not a message, or whose reply or texts would be too large."""
     if isinstance(request, _Garbage):
-        raise DaqmxError(Code.INVALID_VALUE, f"The request of {name} is no message.")
+        raise DaqmxError(Code.INVALID_VALUE, f"The request of {name} is not a message.")
     for field, value in request.ListFields():
         kind = field.cpp_type
         if field.name in _ROOMS:

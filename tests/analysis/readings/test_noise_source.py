@@ -80,7 +80,7 @@ def test_coarse_readings_tell_neither_noise_nor_zero_at_rest(tmp_path: Path, at:
     record, compared = Readings(run).record, compare(Readings(run), MODEL, "train")
     assert record.noise == compared.noise == describe(run)["noise_floor_m"]
     assert record.noise == pytest.approx(np.hypot(NOISE, step / np.sqrt(12.0)), rel=0.15)
-    # rounded alike, they are no 200 readings of the zero
+    # rounded alike, they are not 200 readings of the zero
     assert record.valid is not None
     assert not record.valid[: record.lead_in].any()
     assert record.valid[record.lead_in :].all()

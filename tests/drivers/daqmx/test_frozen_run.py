@@ -150,7 +150,7 @@ def test_run_that_goes_on_after_its_guardian_acted_never_raises_a_voltage(freeze
             assert freeze.raised == []
         assert steps >= STEPS | ({"WriteDigitalLines"} if settings is WIRED else set())
         assert freeze.number > 0
-        # what is admitted anew is played
+        # what is admitted again is played
         freeze.number, freeze.struck = 0, False
         assert play(bench.rig, LONG).counts.shape[1] == LONG.samples
 

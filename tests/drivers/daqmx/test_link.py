@@ -26,7 +26,7 @@ from tests.tools.command import write
 from tests.tools.daqmx import served
 
 REMOTE = "daqmx:Dev1@rig-server.example:31763"
-#: Of the documentation's network (RFC 5737): nobody is there.
+#: Of the documentation's network (RFC 5737): no one is there.
 REMOTE_SERVER = "192.0.2.7:31763"
 NAMES = ("card.tls_ca", "card.tls_cert", "card.tls_key")
 

@@ -1,4 +1,4 @@
-"""A thermo-hygrometer beside a run: its newest value, and never an old one as a present one."""
+"""A thermo-hygrometer next to a run: its newest value, and never an old one as a present one."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_a_value_has_its_age_and_is_unknown_when_it_is_too_old() -> None:
     lost = watch.reading()
     assert not lost.known
     assert lost.trouble == "the cable is off"
-    # the port is opened again by itself
+    # the port is opened again on its own
     sensor.next = RoomReading(22.0, 41.0)
     watch.poll()
     assert watch.reading() == RoomReading(22.0, 41.0)

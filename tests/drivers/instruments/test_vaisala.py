@@ -94,7 +94,7 @@ def test_a_silent_probe_is_an_error_in_bounded_time() -> None:
 
 
 def test_a_wrong_baud_rate_is_named_with_what_came() -> None:
-    with pytest.raises(ThermohygrometerError, match=r"is '\\xfe\\x81', which is no reading"):
+    with pytest.raises(ThermohygrometerError, match=r"is '\\xfe\\x81', which is not a reading"):
         probe(b"\xfe\x81\r\n", b"\xfe\x81\r\n").read()
 
 

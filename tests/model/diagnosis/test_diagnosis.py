@@ -194,12 +194,12 @@ def test_missing_stress_vanishes_with_the_effect():
 
 @pytest.mark.deep
 def test_a_single_event_is_left_out_of_predictions():
-    # a load that slips by a tenth: whatever is found beside it has taken a part of it over
+    # a load that slips by a tenth: whatever is found next to it has taken a part of it over
     slipped = replace(PLAIN, effects=effect("sudden change of force", stress=-200.0, moment=4.3))
     found = diagnose([record_of(slipped)], PLAIN, workers=1)
     assert found.steps[0].effect == "sudden change of force"
     assert found.verdict == EXPLAINED
-    # no law explains half of it: the springs stay as they are beside it
+    # no law explains half of it: the springs stay as they are next to it
     assert found.final.predicting == replace(found.final.model, effects=())
     assert any("other recordings are predicted without it" in note for note in found.notes)
 

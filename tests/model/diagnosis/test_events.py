@@ -1,4 +1,4 @@
-"""Events and drift of one recording, beside a model that stays as it is."""
+"""Events and drift of one recording, next to a model that stays as it is."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def test_what_a_model_could_explain_stays() -> None:
     left = found.displacement - noise
     # about the jump of 40 um the readings are as they were
     assert np.max(np.abs((left - np.median(left))[1496:1504])) < 2e-6
-    # where the misfit is no smooth curve, all of them are
+    # where the misfit is not a smooth curve, all of them are
     mains = noise + 15e-6 * np.sin(2.0 * np.pi * 50.0 * TIME + 0.3)
     record = record_with(noise)
     assert without_tails(record, mains) is record

@@ -110,7 +110,7 @@ def test_at_the_optimum_nothing_is_left_to_do():
     fit = descend_broyden(problem, best.x, held)
     assert fit.converged
     require_the_optimum(fit)
-    # itself, and one Jacobian, one-sided, to be sure: the place again beside the others
+    # itself, and one Jacobian, one-sided, to be sure: the place again next to the others
     assert problem.simulations == 2 + np.count_nonzero(~held)
     problem.simulations = 0
     fit = descend_broyden(problem, best.x, held, best.jacobian, sure=False)

@@ -134,7 +134,7 @@ def test_what_is_known_is_not_asked_again():
     asked = problem.simulations
     problem.simulations = 0
     np.testing.assert_array_equal(problem.find_coarse_columns(x, free, springs), told)
-    # the place itself twice, and twice again beside the one number
+    # the place itself twice, and twice again next to the one number
     assert problem.simulations == 6 < asked
     # who was not told is not
     doubted = springs.copy()

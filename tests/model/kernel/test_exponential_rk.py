@@ -102,7 +102,7 @@ def test_a_drag_of_any_strength_takes_no_more_steps_than_none(drag):
 
 
 def test_a_linear_film_of_one_branch_is_exact_in_coarse_steps():
-    # small steps of the voltage on a strong branch beside a weak spring: linear, and nothing left
+    # small steps of the voltage on a strong branch next to a weak spring: linear, and nothing left
     network = Network(Spring(40e3), (Branch(Spring(200e3), 0.1),))
     actuator = Actuator(THESIS_FILM, THESIS_LOAD, network)
     time = ticks(4.0, 5e-3)

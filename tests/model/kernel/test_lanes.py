@@ -79,7 +79,7 @@ def test_every_effect_takes_part_in_a_pack_as_it_does_alone(name):
     drive = a_drive(seconds=0.2)
     alone, status = reading_of(c, LENGTH, drive)
     assert status == kernel.OK
-    # beside a film at the effect's neutral values
+    # next to a film at the effect's neutral values
     neutral = PLAIN.coefficients()
     films = moved(np.array([c, neutral, c]), drive)
     for film in films[[0, 2]]:

@@ -1,4 +1,4 @@
-"""Files of other programs that are no tables: JSON, HDF5, MAT, TDMS and Parquet."""
+"""Files of other programs that are not tables: JSON, HDF5, MAT, TDMS and Parquet."""
 
 from __future__ import annotations
 

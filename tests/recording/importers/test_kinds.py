@@ -160,7 +160,7 @@ def test_groups_of_thousands_are_read_where_they_are_sure(tmp_path: Path) -> Non
         (table(), {"columns": {"voltage_V": "voltage_V*0"}}, "a scale of 0 leaves nothing"),
         (table(), {"columns": {"displacement_raw_V": "displacement_mm"}}, "their scaling with"),
         (table(), {"rate_Hz": -1.0, "columns": {}}, "the rate is -1.0 Hz"),
-        (table(), {"names_line": 9}, "line 9 is no line of names: the numbers begin in line 2"),
+        (table(), {"names_line": 9}, "line 9 is not a line of names: the numbers begin in line 2"),
         (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), {}, "not a text file, and of no other kind"),
     ],
 )  # fmt: skip

@@ -51,7 +51,7 @@ GERMAN = str.maketrans(".,", ",.")
         pytest.param(
             table("Time (s);Voltage (V);Travel (mm)", "{t:.2f};{v:,.0f};{m:.9f}")
             .translate(GERMAN).replace("\n", ";\n"),
-            id="whole thousands beside decimal commas, and a separator at the end",
+            id="whole thousands next to decimal commas, and a separator at the end",
         ),
         pytest.param(
             table("Time (s),Voltage (V),Travel (mm)", '{t:.2f},"{v:,.6f}",{m:.9f}'),

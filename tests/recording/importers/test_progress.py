@@ -84,7 +84,7 @@ def test_columns_are_listed_in_one_reading(tmp_path: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr(text_file, "blocks_of", counted)
     path = tmp_path / "in.csv"
-    # a text among the columns, cells that are no numbers, and a row that is too short
+    # a text among the columns, cells that are not numbers, and a row that is too short
     path.write_text(
         "time_s,state,voltage_V,displacement_mm\n0,idle,0,1.5\n1,on,5,2.5\n2,on,-,OVER\n3,on\n"
         "4,off,9,4.5\n"
@@ -156,7 +156,7 @@ def test_a_scale_that_overrules_the_unit_of_a_name_is_said(tmp_path: Path) -> No
     assert any("although its name says mm" in note for note in said.notes)
     assert any("its sign right" in doubt for doubt in said.doubts)
     np.testing.assert_allclose(open_recording(out).displacement, -2.0 * MOVED, rtol=1e-9, atol=1e-9)
-    # the same unit said in another way is no contradiction
+    # the same unit said in another way is not a contradiction
     options = ImportOptions(columns={"displacement_um": "displacement_mm*1000"})
     assert not any("although" in n for n in import_file(path, out, options, overwrite=True).notes)
 

@@ -1,4 +1,4 @@
-"""What a file states beside its values: scales, units, rates, formats of cells, and names."""
+"""What a file states next to its values: scales, units, rates, formats of cells, and names."""
 
 from __future__ import annotations
 

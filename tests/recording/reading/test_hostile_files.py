@@ -174,7 +174,7 @@ def test_damaged_files_are_a_sentence(tmp_path: Path, name: str) -> None:
             TARGETS[name].read(path)
         except InputError:
             refused += 1
-    # what is damaged beside a recording spoils no reading of it
+    # what is damaged next to a recording spoils no reading of it
     assert refused > 5 or name == "sidecars"
 
 

@@ -1,4 +1,4 @@
-"""Files beside a recording that another program planted: no wait, no memory, no other file lost."""
+"""Files next to a recording that another program planted: no wait, no memory, no file lost."""
 
 from __future__ import annotations
 

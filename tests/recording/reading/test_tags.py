@@ -1,4 +1,4 @@
-"""Tags of recordings, in a file beside them."""
+"""Tags of recordings, in a file next to them."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from tests.tools.command import names
 from tests.tools.recordings import Clock, run_counts, writer
 
 pytestmark = pytest.mark.skipif(
-    sys.platform == "win32", reason="Windows lets nobody delete or rename an open file"
+    sys.platform == "win32", reason="Windows lets no one delete or rename an open file"
 )
 
 COUNTS = run_counts(3000)

@@ -1,4 +1,4 @@
-"""The tests of a residual for noise: beside each other before and after, and never denied."""
+"""The tests of a residual for noise: next to each other before and after, and never denied."""
 
 from __future__ import annotations
 

@@ -49,10 +49,10 @@ def test_a_report_is_printed_beside_itself_and_nothing_is_left(tmp_path, prints)
 
 def test_only_reports_of_this_program_are_printed(tmp_path, prints):
     for page, words in (
-        ("<p>hello</p>", "is no report of this program"),
+        ("<p>hello</p>", "is not a report of this program"),
         (PAGE.replace("a &lt;", "c &lt;"), "was changed after it was written"),
-        (sealed("<p>x</p>" + _HEAD), "is no report of this program"),
-        (sealed(_HEAD.replace("&#39;none&#39;", "*", 1)), "is no report of this program"),
+        (sealed("<p>x</p>" + _HEAD), "is not a report of this program"),
+        (sealed(_HEAD.replace("&#39;none&#39;", "*", 1)), "is not a report of this program"),
     ):
         (tmp_path / "page.html").write_text(page, encoding="utf-8", newline="\n")
         with pytest.raises(InputError, match=words):

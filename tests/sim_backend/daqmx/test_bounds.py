@@ -81,7 +81,7 @@ def test_who_listens_takes_no_thread_from_others_and_one_too_many_is_told_so(eve
         assert caught.value.error_code == BUSY
         assert f"at most {LISTENERS} events" in str(caught.value)
         assert answers(card)
-        # the place of one that leaves is free once the server has seen that nobody listens
+        # the place of one that leaves is free once the server has seen that no one listens
         if event == "done":
             tasks[0].register_done_event(None)
         else:

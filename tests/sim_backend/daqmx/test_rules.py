@@ -284,7 +284,7 @@ RULES = {
     "a start with nothing written": (_with_output(_empty_buffer), -200462),
     "a buffer of one sample": (_with_output(_one_sample), -200609),
     "more volts than it has": (_with_output(lambda ao: ao.write(10.5)), -200561),
-    "volts that are no number": (_with_output(lambda ao: ao.write(float("nan"))), -200561),
+    "volts that are not a number": (_with_output(lambda ao: ao.write(float("nan"))), -200561),
     "a write without a start": (
         _with_output(lambda ao: ao.write(1.0, auto_start=False)),
         -200846,

@@ -102,7 +102,7 @@ def test_a_killed_client_has_its_voltage_taken_away(heard, how):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process cannot be halted there")
 def test_a_client_that_is_halted_has_its_voltage_taken_away(heard):
-    """Its link is up and its calls do not come: the pings that nobody answers tell."""
+    """Its link is up and its calls do not come: the pings that no one answers tell."""
     with (
         served(client_timeout=3600.0, link_timeout=1.0) as card,
         victim(card.server.port, "listening") as process,

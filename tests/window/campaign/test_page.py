@@ -190,7 +190,7 @@ def test_what_is_refused_stands_in_the_table_and_nothing_can_be_armed(
     write(page, PLAN.replace("lobe.toml", "lob.toml"), tmp_path)
     surveyed(qtbot, page)
     assert page.table.rows == []
-    assert "neither a preset nor a file beside the plan" in page.controls.blocked.text()
+    assert "neither a preset nor a file next to the plan" in page.controls.blocked.text()
     write(page, PLAN, tmp_path)
     surveyed(qtbot, page)
     assert page.controls.arm.isEnabled()
@@ -374,7 +374,7 @@ def test_the_window_closes_in_a_campaign_at_zero_and_the_journal_goes_on(
     page.controls.paced.setChecked(True)
     press(qtbot, page.controls.arm)
     window.show_page(window.run_page)
-    qtbot.keyClick(window, Qt.Key.Key_F6)  # what is armed is no run
+    qtbot.keyClick(window, Qt.Key.Key_F6)  # what is armed is not a run
     assert not runner.running
     assert not window.run_page.arm_button.isEnabled()
     window.show_page(page)

@@ -100,7 +100,7 @@ def test_keys_are_varied_with_their_values_and_left_alone_again(
 def test_what_is_no_list_is_said_and_changes_nothing(editor: PlanEditor) -> None:
     form, before = editor.form, editor.toml
     form.grid.item(0, 1).setText("3.0, vier")
-    assert "is no list of values" in form.trouble.text()
+    assert "is not a list of values" in form.trouble.text()
     assert editor.toml == before
     form.grid.item(0, 1).setText("3.0")
     assert form.trouble.text() == ""

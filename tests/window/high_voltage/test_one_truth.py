@@ -1,4 +1,4 @@
-"""A number on the screen belongs to a rig, a run and a moment; nothing beside it contradicts."""
+"""A number on the screen belongs to a rig, a run and a moment; nothing next to it contradicts."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def test_no_number_of_the_last_run_stands_under_the_next_one(
     assert readouts(window) == {NOTHING}
     assert page.controls.of_sample.text() == ""
     assert page.controls.time_left.text() == ""
-    # between two of its runs, the last sample is not beside 0 V
+    # between two of its runs, the last sample is not next to 0 V
     status.show_reading(OutputReading(4520.0, 0.4, 1.0))
     assert bar.monitor.text() == "4.52 kV"
     status.set_output(OutputState(Known.CONFIRMED, time.time(), 2.0, tolerance=100.0))

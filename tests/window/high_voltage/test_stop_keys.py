@@ -222,7 +222,7 @@ def test_no_key_but_its_own_starts(qtbot: QtBot, window: MainWindow) -> None:
     assert not page.runner.running  # not before it is armed
     qtbot.keyClick(page, Qt.Key.Key_F5)
     assert page.runner.armed
-    # the mnemonics of other buttons are no second way
+    # the mnemonics of other buttons are not a second way
     assert "&" not in page.arm_button.text() + page.start_button.text()
 
 

@@ -169,4 +169,4 @@ def test_nothing_is_dropped_on_a_field(window: MainWindow) -> None:
     QCoreApplication.sendEvent(window.windowHandle(), enters)
     assert len(fields) > 20
     assert not any(field.acceptDrops() for field in fields)
-    assert window.page(RigPage).acceptDrops()  # what is dropped beside a field or on it is its
+    assert window.page(RigPage).acceptDrops()  # what is dropped next to a field or on it is its

@@ -118,7 +118,7 @@ def test_a_limit_beside_a_wrong_field_is_not_ignored_but_blocks_arming(
     assert page.tabs.tab(0).text() == "✗ film"
     slew = line(page, "limits", "slew_max_kV_per_s")
     slew.selectAll()
-    qtbot.keyClicks(slew, "950000")  # what is wrong with several keys is told beside it
+    qtbot.keyClicks(slew, "950000")  # what is wrong with several keys is told next to it
     assert "amplifier's own slew rate" in page.form("limits").fault("slew_max_kV_per_s")
     assert "not a number" in page.form("film").fault("length_mm")
     slew.clear()

@@ -32,7 +32,7 @@ WAIT = 120_000
 
 @pytest.fixture(autouse=True)
 def _guardians_end(monkeypatch: pytest.MonkeyPatch, qtbot: QtBot) -> Iterator[None]:
-    """A guardian whose card is gone goes on trying to reach it; here nobody will plug it in."""
+    """A guardian whose card is gone goes on trying to reach it; here no one will plug it in."""
     left: list[subprocess.Popen[str]] = []
     close = GuardianProcess.close
 
@@ -82,7 +82,7 @@ def test_a_rig_that_is_unplugged_in_mid_run(qtbot: QtBot, run_page: RunPage, fau
     with served(RIG_FILE, clock=PacedClock(), faults=(fault,)) as there:
         play(qtbot, run_page, there.server.port)
     assert run_page.result.text().startswith("Instrument fault"), run_page.result.text()
-    # nobody can say what is on the wire now
+    # no one can say what is on the wire now
     assert run_page.runner.state is HighVoltage.UNKNOWN
     assert "by hand" in run_page.badge.toolTip()
     # and it is not known any better because somebody armed and thought again

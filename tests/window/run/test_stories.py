@@ -75,7 +75,7 @@ def test_from_the_first_start_to_the_first_recording(qtbot: QtBot, window: MainW
     assert path.parent == window.session.folder
     assert str(path) in page.result.text()
     assert page.runner.state is HighVoltage.CONFIRMED
-    # the model that ran beside it is kept with it
+    # the model that ran next to it is kept with it
     assert recording.displacement_model is not None
     assert "modulus_Pa" in recording.model_toml
     # what was drawn is what was recorded
@@ -247,7 +247,7 @@ def test_what_goes_wrong_is_said_and_the_rig_is_safe(
     assert page.result.text().startswith(headline)
     assert words in page.result.text() + " ".join(a.message for a in page.alarms.alarms)
     assert page.runner.state is HighVoltage.CONFIRMED
-    assert (HighVoltage.RAMPING in states) == ramps  # also where nobody has pressed STOP
+    assert (HighVoltage.RAMPING in states) == ramps  # also where no one has pressed STOP
     recording = open_recording(path)
     assert recording.events
     assert recording.outcome != "finished"

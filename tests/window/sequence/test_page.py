@@ -401,7 +401,7 @@ def test_files_are_dropped(qtbot: QtBot, page: SequencePage, tmp_path: Path) -> 
     page.editor.choose(5)
     drop(page, tmp_path / "w.csv")
     settled(qtbot, page.session)
-    assert page.draft.segments[6] == {"kind": "csv", "file": "w.csv"}  # beside rich.toml
+    assert page.draft.segments[6] == {"kind": "csv", "file": "w.csv"}  # next to rich.toml
     assert page.session.preview is not None
     assert page.session.preview.playable
 

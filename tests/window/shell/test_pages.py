@@ -59,7 +59,7 @@ def test_one_line_lists_makes_resets_restores_and_closes_a_page(
     row = len(PAGES)
     assert window.list.item(row).text() == "Notes"
     assert window.list.item(row).toolTip() == f"Notes (Ctrl+{row + 1})"
-    assert not isinstance(window.stack.widget(row), NotesPage)  # nobody has needed it yet
+    assert not isinstance(window.stack.widget(row), NotesPage)  # no one has needed it yet
     keys = {action.shortcut().toString(): action for action in window.actions()}
     keys[f"Ctrl+{row + 1}"].trigger()
     page = window.page(NotesPage)

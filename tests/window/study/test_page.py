@@ -225,7 +225,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     assert outcome.experiment.name in words(page.experiment)
     assert [len(p.drawn) for p in page.residual.time] == [1, 1]
 
-    # the improved model beside the next measurement
+    # the improved model next to the next measurement
     click(qtbot, page.overlay_button)
     found = page._shown
     assert found is not None
@@ -248,7 +248,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     assert before is not None
     assert after is not None
     assert after.rms < 0.5 * before.rms
-    # it ran beside the measurement as it runs afterwards
+    # it ran next to the measurement as it runs afterwards
     live = run.live
     assert live is not None
     qtbot.waitUntil(lambda: live.now() is not None and bool(live.now().errors), timeout=_PATIENCE)

@@ -194,15 +194,15 @@ def _asked(
     label = labels[column]
     if scaled := getattr(source, "scales", {}).get(column):
         raise InputError(
-            f"{source.path}: beside {column!r} stands {scaled}, and it is not known whether its "
+            f"{source.path}: next to {column!r} stands {scaled}, and it is not known whether its "
             f"values contain it: give its scale, such as "
             f"{shlex.quote(f'{target.name}={column}*2')}, or *1"
         )
     if label.unknown:
         raise InputError(
-            f"{source.path}: {column!r} is in {label.unknown!r} by its name, which is no unit that "
-            f"is known here, and {target.name} asks for {target.unit}; give its scale, such as "
-            f"{shlex.quote(f'{target.name}={column}*4')}, or *1 if it is in {target.unit}"
+            f"{source.path}: {column!r} is in {label.unknown!r} by its name, which is not a unit "
+            f"that is known here, and {target.name} asks for {target.unit}; give its scale, such "
+            f"as {shlex.quote(f'{target.name}={column}*4')}, or *1 if it is in {target.unit}"
         )
     if not label.unit or label.conflict == target.unit:
         return Pick(target, column, scale)

@@ -67,7 +67,7 @@ class Chosen:
 
     ``unsure`` are sentences: while there is one, nothing may be imported. ``notes`` say what was
     found without being asked for. ``optional`` are quantities that a recording can do without, and
-    that nobody asked for. ``table_choices`` are the tables of which one must be chosen. ``missing``
+    that no one asked for. ``table_choices`` are the tables of which one must be chosen. ``missing``
     are names of targets for which no column was found. ``channels`` has the name, unit and label of
     each declared channel, by its key in ``picked``.
     """

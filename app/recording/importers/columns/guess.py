@@ -194,7 +194,7 @@ class Guess:
         if column in scaled:
             target = target_of(target_name(quantity, label.unit or _likely(quantity)))
             self._chosen.unsure.append(
-                f"beside {column!r} stands {scaled[column]}, and it is not known whether its "
+                f"next to {column!r} stands {scaled[column]}, and it is not known whether its "
                 f"values contain it: its scale is needed, as "
                 f"{shlex.quote(f'{target.name}={column}*FACTOR')} or *1"
             )
@@ -214,7 +214,7 @@ class Guess:
         elif label.conflict:
             self._chosen.unsure.append(
                 f"{column!r} is in {label.unit} by its name and in {label.conflict} by the unit "
-                f"that the file gives beside it"
+                f"that the file gives next to it"
             )
             target = target_of(target_name(quantity, label.unit))
             self._pick(target, column, target.scale, doubt or "unit", is_open=several, unit=True)

@@ -16,7 +16,7 @@ FAR, FAR_CODE = 100.0, 2.0
 _KINDS, _REPEATED, _DIFFERENT = 2, 2, 10
 #: Values that are compared with each other first: mostly they are enough.
 _SOME = 1000
-#: SCPI says 9.9E37 of what is too large, and 9.91E37 of what is no number.
+#: SCPI says 9.9E37 of what is too large, and 9.91E37 of what is not a number.
 OVERFLOW = 9.9e36
 _CODES = frozenset({7999.0, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0})
 _NINES = re.compile(r"9{3,}(?:\.9+|\.0)?")

@@ -26,7 +26,7 @@ _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d+$)")
 
 
 def cell_of(cells: Sequence[str], column: TextColumn) -> str:
-    """Return the cell of ``column``; of a time of day, with the date that stands beside it."""
+    """Return the cell of ``column``; of a time of day, with the date that stands next to it."""
     if column.date_place is None:
         return cells[column.place]
     return f"{cells[column.date_place].removesuffix(' 00:00:00')} {cells[column.place]}".strip()

@@ -47,8 +47,8 @@ C = TypeVar("C", bound=_Column)
 class NamedColumns(Generic[C]):
     """Columns ``C`` of a file by their names; the base of a ``Source``.
 
-    ``progress`` is called with the part of a reading that is done, 0 to 1; whoever waits for it
-    sets it.
+    ``progress`` is called with the part of a reading that is done, 0 to 1; a caller that waits for
+    it sets it.
     """
 
     def __init__(self, columns: Mapping[str, C]) -> None:
@@ -62,7 +62,7 @@ class NamedColumns(Generic[C]):
 
     @property
     def units(self) -> dict[str, str]:
-        """Units by column, where the file gives them beside the name."""
+        """Units by column, where the file gives them next to the name."""
         return {name: column.unit for name, column in self._columns.items() if column.unit}
 
     def own_name(self, name: str) -> str:

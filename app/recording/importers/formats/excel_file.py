@@ -65,7 +65,7 @@ Cell = str | float | int | bool | datetime | date | time_of_day | timedelta | No
 class ExcelFile(StoredColumns):
     """The workbook at ``path``. Raises ``InputError`` if it cannot be read or has no numbers.
 
-    ``names_line`` is the row of the names, from 1, where it is not found by itself. Formulas have
+    ``names_line`` is the row of the names, from 1, where it is not found on its own. Formulas have
     the values that were saved with them.
     """
 
@@ -183,7 +183,7 @@ class _Sheet:
         )
 
     def complaint(self, column: TextColumn, index: int) -> str:
-        """Return why the value ``index`` of ``column`` is no number."""
+        """Return why the value ``index`` of ``column`` is not a number."""
         row = int(self._kept[index])
         if column.place in self._formulas and (column.place, row) not in self._wrong:
             return _NO_VALUE
@@ -320,7 +320,7 @@ def _number(cell: Cell, column: TextColumn) -> tuple[float, str]:
 
 
 def _cell_of(row: Sequence[Cell], column: TextColumn) -> Cell:
-    """Return the cell of ``column``; of a time of day, with the date that stands beside it."""
+    """Return the cell of ``column``; of a time of day, with the date that stands next to it."""
     cell = row[column.place] if column.place < len(row) else None
     if column.date_place is None or cell is None:
         return cell

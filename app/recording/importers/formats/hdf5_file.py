@@ -40,7 +40,7 @@ ROWS_AS_COLUMNS = 16
 RANGE_MAX = 10**8
 #: Names of datasets that say nothing: their group names them.
 _GENERIC = frozenset({"data", "raw", "samples", "signal", "value", "values", "y"})
-#: Names of fields that say nothing beside the name of the dataset that they are fields of.
+#: Names of fields that say nothing next to the name of the dataset that they are fields of.
 _GENERIC_FIELDS = _GENERIC - {"y"}
 _UNITS = ("units", "unit", "Units", "Unit", "UNITS", "unit_string", "unit_symbol")
 _LABELS = ("long_name", "label", "description", "name")

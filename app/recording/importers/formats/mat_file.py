@@ -36,7 +36,7 @@ OBJECTS = (
     "reads: save their columns with s = table2struct(t, 'ToScalar', true) and "
     "save(..., '-struct', 's'), or write them with writetable"
 )
-#: Fields that say nothing by their names: the text in a field beside them names them.
+#: Fields that say nothing by their names: the text in a field next to them names them.
 _GENERIC, _NAMES = frozenset({"data", "values", "value", "y", "signal"}), ("label", "name", "title")
 _UNITS = ("unit", "units")
 #: Signature of HDF5, and its place behind the block of text of a MAT file of version 7.3.

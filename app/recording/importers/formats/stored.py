@@ -45,13 +45,13 @@ class Stored:
     own : str
         Its name without its path; of a column of a matrix, with its number: ``x[2]``.
     unit, label : str
-        What the file says of it beside its name.
+        What the file says of it next to its name.
     table : str
         The group, sheet or struct that it belongs to; columns of "" belong to all.
     step_s, start_s : float, optional
         Time from row to row, and of the first row.
     cell : callable, optional
-        Returns what is wrong with the value at an index that is no number, in words.
+        Returns what is wrong with the value at an index that is not a number, in words.
     row : callable, optional
         Returns the place in the file of the value at an index, in words.
     began : datetime, optional
@@ -59,7 +59,7 @@ class Stored:
     is_utc : bool
         True for dates that are of UTC, False for those of a clock on the wall.
     scaled : str
-        A scale that the file states beside the values, and of which no convention says whether
+        A scale that the file states next to the values, and of which no convention says whether
         they contain it, such as ``gain = 2``.
     """
 
@@ -82,7 +82,7 @@ class StoredColumns(NamedColumns[Stored]):
     """The ``columns`` of the file at ``path``, by their paths; see ``Source``.
 
     ``what`` the file should be ("an HDF5 file") is for messages. ``separator`` stands between the
-    parts of a path. Columns of one value beside longer ones are settings of the measurement: the
+    parts of a path. Columns of one value next to longer ones are settings of the measurement: the
     one that is called ``fs`` or ``dt`` gives the time from row to row. Raises ``InputError`` if
     there are no columns.
     """
@@ -120,7 +120,7 @@ class StoredColumns(NamedColumns[Stored]):
 
     @property
     def scales(self) -> dict[str, str]:
-        """Scales that the file states beside the values, by column: with them, or as a setting."""
+        """Scales that the file states next to the values, by column: with them, or as a setting."""
         found = {name: column.scaled for name, column in self._columns.items() if column.scaled}
         for setting, one in self._settings.items():
             value = self.read_setting(setting)
@@ -316,7 +316,7 @@ def scale_of(setting: str, column: str) -> bool:
 
 
 def stated_scale(told: Mapping[str, object], integers: bool = False) -> str:
-    """Return the first scale or offset that stands beside a column, such as "gain = 2", or "".
+    """Return the first scale or offset that stands next to a column, such as "gain = 2", or "".
 
     ``told`` is what the file says of the column by name; the column has ``integers`` or others.
     """

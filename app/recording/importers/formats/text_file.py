@@ -56,7 +56,7 @@ __all__ = ["IMPORTER", "TextFile"]
 SHORT = 2**15
 #: Threads that parse blocks.
 THREADS = 2
-#: A number with something behind it that is no comment: 1.#IND is how some programs write NaN.
+#: A number with something behind it that is not a comment: 1.#IND is how some programs write NaN.
 _NOT_COMMENT = re.compile(rb"[\d.]#")
 #: Bytes of an ASCII character in encodings where it has several.
 _WIDTHS = MappingProxyType({"utf-16": 2, "utf-32": 4})
@@ -78,8 +78,8 @@ _LOST_MAX = 20_000
 class TextFile(NamedColumns[TextColumn]):
     """The text file at ``path``. Raises ``InputError`` if it holds no table of numbers.
 
-    ``names_line`` is the number of the line of names, from 1, where it is not found by itself. With
-    ``skip_bad_rows`` rows that cannot be read are left out; ``skipped`` has their lines afterwards.
+    ``names_line`` is the number of the line of names, from 1, where it is not found on its own.
+    With ``skip_bad_rows`` rows that cannot be read are left out; ``skipped`` then has their lines.
     """
 
     is_finite = True  # other cells are refused, or their rows left out
@@ -123,7 +123,7 @@ class TextFile(NamedColumns[TextColumn]):
                     columns[name] = replace(column, name=name, group=group)
                     self._section_of[name] = section
         super().__init__(columns)
-        #: columns that are given up, with ``GapError``, where a cell is no number
+        #: columns that are given up, with ``GapError``, where a cell is not a number
         self.optional: frozenset[str] = frozenset()
         self._skip = skip_bad_rows
         # it costs a third of the parsing
@@ -294,7 +294,7 @@ class TextFile(NamedColumns[TextColumn]):
     def overview(self, names: Sequence[str], count: int) -> dict[str, ColumnOverview]:
         """Return the first ``count`` values of columns, how many there are, and their range.
 
-        All are read at once. Cells that are no numbers are passed over, in each column by itself.
+        All are read at once. Cells that are not numbers are passed over, in each column on its own.
         """
         found: dict[str, ColumnOverview] = {}
         for section in dict.fromkeys(self._section_of.get(name) for name in names):
@@ -518,7 +518,7 @@ class _HopelessError(Exception):
 
 
 class _WrongCellError(Exception):
-    """A cell is no number, or a line is no row, at a ``place`` in words.
+    """A cell is not a number, or a line is not a row, at a ``place`` in words.
 
     ``column`` is its name, "" where the whole line is wrong; ``grouped`` if digits of the cell
     stand in groups.

@@ -198,7 +198,7 @@ class _Table:
                 if len({len(cells) for cells in beside}) > 1 or not all(map(good, run)):
                     continue
                 width = len(run[0])
-                # rows with a cell that is no number may stand first
+                # rows with a cell that is not a number may stand first
                 while strict and least > 1 and at > 0 and places[at - 1] == places[at] - 1:
                     if len(row(at - 1)) != width or not _is_data(row(at - 1), strict=False):
                         break
@@ -266,7 +266,7 @@ class _Table:
         if given is not None:
             if given not in above:
                 raise InputError(
-                    f"{path}: line {given + 1} is no line of names: the numbers begin in line "
+                    f"{path}: line {given + 1} is not a line of names: the numbers begin in line "
                     f"{self.first + 1}"
                 )
             between = [i for i in above if i > given]
@@ -380,7 +380,7 @@ class _Table:
             return False  # which is above which column cannot be told
         named = [cell for cell in cells if cell]
         numbers = sum(is_number(cell) for cell in named)
-        # a column at the end may have no name: a counter, or a note beside the table
+        # a column at the end may have no name: a counter, or a note next to the table
         whole = len(cells) >= self._used or (
             sum(map(_says, cells)) >= NAMED_MIN and not _are_all_units(cells)
         )
@@ -539,7 +539,7 @@ def _says(cell: str) -> bool:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Return True if ``cells`` are a line of units; an oscilloscope has numbers beside them."""
+    """Return True if ``cells`` are a line of units; an oscilloscope has numbers next to them."""
     named = [c for c in cells if c and not is_number(c) and c not in _NO_UNITS]
     known = [c for c in named if unit_of(c) is not None]
     return len(known) > 0 and len(known) >= len(named) - 1

@@ -15,7 +15,7 @@ ROOM = 1.05
 class Table:
     """Columns that grow by blocks of rows; ``rows`` of them are there.
 
-    Each has memory of its own, which is given back once nobody needs that column any more. A table
+    Each has memory of its own, which is given back once no one needs that column any more. A table
     of no ``width`` counts the rows only.
     """
 

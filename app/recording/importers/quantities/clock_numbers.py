@@ -1,4 +1,4 @@
-"""Times that are written as one number and are no number of seconds: 40.59 for 40 min 59 s."""
+"""Times that are written as one number and are not a number of seconds: 40.59 for 40 min 59 s."""
 
 from __future__ import annotations
 

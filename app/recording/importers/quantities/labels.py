@@ -110,10 +110,10 @@ _EAST_ASIAN = MappingProxyType(
 _EAST_ASIAN_ENDS = tuple(
     (_plain(end), quantity) for quantity, ends in _EAST_ASIAN.items() for end in ends.split()
 )
-#: Ends of a pressure, which is no force.
+#: Ends of a pressure, which is not a force.
 _EAST_ASIAN_OTHERS = ("压力", "圧力", "壓力")
 
-#: Words of a quantity of another kind: a speed is no travel.
+#: Words of a quantity of another kind: a speed is not travel.
 _OTHERS = frozenset(
     re.findall(
         r"\w+",
@@ -135,7 +135,7 @@ class Label:
     seems to be a unit and is none of ``UNITS``.
 
     ``asked`` are quantities that the column may be although its word ``qualifier`` leaves it open:
-    "desired displacement". ``conflict`` is a unit that the file gives beside the name and that is
+    "desired displacement". ``conflict`` is a unit that the file gives next to the name and that is
     another one than the name's. ``compressive``: its positive values mean compression.
     ``unexplained`` is a word of a name without a quantity that is not known.
     """
@@ -219,7 +219,7 @@ def label_of(name: str, unit: str = "") -> Label:
     words, found = name, unit_of(unit) if unit else None
     bracketed = name.strip().translate(_BRACKETS)
     inside = [text for text in _IN_BRACKETS.findall(bracketed) if unit_of(text)]
-    if len(inside) > 1:  # a number beside a unit counts: Force (1) [N]
+    if len(inside) > 1:  # a number next to a unit counts: Force (1) [N]
         inside = [text for text in inside if text.strip() != "1"]
     if len(inside) == 1:
         words, found = bracketed.replace(f"[{inside[0]}]", " "), unit_of(inside[0])
@@ -239,7 +239,7 @@ def label_of(name: str, unit: str = "") -> Label:
     said = _read(words)
     quantities, raw = said.quantities, ""
     if found:
-        # the output of a laser or of a monitor in volts is no voltage at the film
+        # the output of a laser or of a monitor in volts is not a voltage at the film
         raw = next((q for q in quantities if dimensions == ("voltage",) and q in _RAW), "")
         if raw and raw != "voltage_monitor":
             quantities = []

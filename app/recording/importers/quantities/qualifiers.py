@@ -1,4 +1,4 @@
-"""Words beside a quantity in a column's name: harmless, of another quantity, or open."""
+"""Words next to a quantity in a column's name: harmless, of another quantity, or open."""
 
 from __future__ import annotations
 

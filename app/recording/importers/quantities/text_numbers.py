@@ -10,7 +10,7 @@ __all__ = ["GROUPED", "MINUS", "Signs", "is_number", "signs_of"]
 
 #: The minus of typography, and the dash that spreadsheets make of a hyphen.
 MINUS = "\N{MINUS SIGN}\N{EN DASH}"
-#: Signs between groups of digits that are no decimal sign anywhere.
+#: Signs between groups of digits that are not a decimal sign anywhere.
 _BETWEEN = "' \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{RIGHT SINGLE QUOTATION MARK}"
 _TAIL = r"(?:[eEdD][+-]?\d+)?|[+\-−]?(?:nan|inf|infinity)"  # noqa: RUF001
 _POINT = re.compile(rf"[+\-{MINUS}]?(?:\d+\.?\d*|\.\d+){_TAIL}", re.I)
@@ -100,7 +100,7 @@ def _are_thousands(cells: Sequence[str], grouped: Sequence[str], sign: str) -> b
     return bool(plain) and all(cell.isdigit() and len(cell) <= _GROUP for cell in plain)
 
 
-#: Digits of a group, and numbers with a group from which it is sure that they are no decimals:
+#: Digits of a group, and numbers with a group from which it is sure that they are not decimals:
 #: of so many with three decimals all would end in another digit than 0 one time in ten.
 _GROUP, _GROUPS_MIN = 3, 22
 

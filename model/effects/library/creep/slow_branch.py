@@ -1,4 +1,4 @@
-"""Creep by one more slow branch: a spring in series with a dashpot, beside the network."""
+"""Creep by one more slow branch: a spring in series with a dashpot, next to the network."""
 
 from __future__ import annotations
 
