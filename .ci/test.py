@@ -5,6 +5,8 @@ from pathlib import Path
 
 from bootstrap import prepare, prepare_screen, run, start, wait
 
+# ctrl-C ends this process, which ends those that it has started
+DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 # two processes that find no kernels would compile them twice
 RUNS = "from dearig.acquisition.warm_up import compile_kernels; compile_kernels()"
 # and a process that only collects leaves compiled modules to those that run
@@ -23,7 +25,7 @@ def compile_all(python: Path) -> int:
     if not run([str(python), "-c", COLD]):
         return 0
     print("Compiling the numerical kernels, once for these sources ...", flush=True)
-    return wait(*(start([str(python), "-c", code], quiet=True) for code in (RUNS, FITS)))
+    return wait(*(start([str(python), "-c", DEAF + code], quiet=True) for code in (RUNS, FITS)))
 
 
 def test(python: Path, *arguments: str) -> int:
