@@ -433,7 +433,7 @@ def _outcome(
         stands=stands,
         noise=noise,
         experiment=None,
-        experiment_words=(
+        experiment_text=(
             "No experiment is proposed: the recordings are of films, which no voltage sequence "
             "drives."
         ),
@@ -453,7 +453,7 @@ def _outcome(
     outcome = with_excitation(outcome, settings.rig)
     if outcome.kind == "actuator":
         experiment, words = experiment_of(finding, noise, settings.rig, outcome.is_rejected, fitted)
-        outcome = replace(outcome, experiment=experiment, experiment_words=words)
+        outcome = replace(outcome, experiment=experiment, experiment_text=words)
     if not outcome.recommends_final:
         plain = ModelFile(f"{title}, nothing added", finding.baseline.predicting)
         outcome = replace(outcome, model=plain)

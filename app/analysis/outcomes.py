@@ -316,7 +316,7 @@ class DiagnoseOutcome:
     ``model_path`` is where it was saved, "" if it was not. ``stands`` are the baseline, the model
     after each step, and last the final one. ``noise`` is the pooled noise floor of the training
     recordings in m or Pa. ``experiment`` separates explanations that the data do not separate;
-    ``experiment_words`` describes it, or says why there is none. ``performed`` describes the
+    ``experiment_text`` describes it, or says why there is none. ``performed`` describes the
     experiments that were run on a rig, one sentence each. ``quality`` are sentences on recordings.
     ``ended`` is the error that ended the recording on the rig early, None if none did.
     ``not_compared`` names validation recordings that the final model cannot follow. ``few_data``
@@ -340,7 +340,7 @@ class DiagnoseOutcome:
     stands: tuple[Evaluation, ...]
     noise: float
     experiment: SeparatingExperiment | None
-    experiment_words: str
+    experiment_text: str
     quality: tuple[str, ...]
     seconds: float
     model_path: str = ""

@@ -15,7 +15,7 @@ from dearig.api.models import ModelSource, as_model_file
 from dearig.api.written import HasFiles, Writers
 from dearig.recording.json_file import write_json
 from dearig.report.figures.signals import signal_figure
-from dearig.report.sensed import sense_json, sense_sentences, sensed_texts
+from dearig.report.sensed import sense_json, sense_texts, sensed_texts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,7 @@ class SenseResult(HasFiles):
     @property
     def sentences(self) -> tuple[str, ...]:
         """How large the error is, and what would reduce it."""
-        return sense_sentences(self.outcome)
+        return sense_texts(self.outcome)
 
     def plot(self) -> Figure:
         """Plot the voltage, and the displacement of the laser and of the film as its own sensor.

@@ -130,7 +130,7 @@ def campaign(
     from dearig.cli.terminal import campaign_runs
     from dearig.config.campaignfile import load_campaign
     from dearig.config.modelfile import load_actuator
-    from dearig.config.notify import notify_sentence
+    from dearig.config.notify import notify_text
     from dearig.report.pages.campaign import (
         campaign_json,
         forecast_json,
@@ -158,7 +158,7 @@ def campaign(
     with working(json) as (console, progress):
         announce_rig(console, rig, settings, provenance[SOURCE])
         notify = notify_from(notify_command, notify_webhook, notify_on, loaded.notify).checked()
-        if said := notify_sentence(notify):
+        if said := notify_text(notify):
             # a plan may be another person's: what it starts is said before anything is played
             print_line(console, f"{loaded.source}: {said}")
 

@@ -14,7 +14,7 @@ from pydantic import Field
 from dearig.config.toml_input import TomlTable
 from dearig.errors import InputError
 
-__all__ = ["EVENTS", "Notify", "NotifyTable", "notify_sentence", "redacted"]
+__all__ = ["EVENTS", "Notify", "NotifyTable", "notify_text", "redacted"]
 
 Event = Literal["run-ended", "tripped", "queue-stopped"]
 
@@ -58,7 +58,7 @@ class Notify:
         return replace(self, command=command, webhook=_address(self.webhook))
 
 
-def notify_sentence(notify: Notify) -> str:
+def notify_text(notify: Notify) -> str:
     """Return a sentence on what ``notify`` starts and whom it tells, "" for nothing."""
     told = [
         *([f"starts {shlex.join(notify.command)}"] if notify.command else []),

@@ -350,7 +350,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "average": experiment.average,
             "separation_by_channel": {n: finite(apart) for n, apart in experiment.by_channel},
         },
-        "experiment_words": outcome.experiment_words,
+        "experiment_words": outcome.experiment_text,
         "excitation": _excitation_json(outcome),
         "bands": {
             c.name: _band_json(c)

@@ -12,14 +12,14 @@ from dearig.model.readings.channels import GAIN_ERROR
 from dearig.model.readings.measures import root_mean_square
 from dearig.report.text.numbers import significant
 
-__all__ = ["sense_json", "sense_sentences", "sensed_texts"]
+__all__ = ["sense_json", "sense_texts", "sensed_texts"]
 
 
 def sensed_texts(outcome: SenseOutcome) -> list[str]:
     """Return the lines on ``outcome`` for a terminal or a notebook."""
     agreement = outcome.agreement
     if agreement is None:
-        return list(sense_sentences(outcome))
+        return list(sense_texts(outcome))
     scatter = agreement.gain_error
     known = np.isfinite(outcome.sensed.displacement)
     return [
@@ -27,14 +27,14 @@ def sensed_texts(outcome: SenseOutcome) -> list[str]:
         f"voltages from {significant(outcome.sensed.threshold)} V",
         f"difference from the laser: {significant(agreement.rms * 1e6)} um RMS; "
         f"{significant(100.0 * agreement.coverage)} % of the rows are within two standard errors",
-        *sense_sentences(outcome),
+        *sense_texts(outcome),
         f"Gain by the laser: {significant(agreement.gain, 4)}"
         + ("" if scatter is None else f", known to {significant(100.0 * scatter, 2)} %")
         + f"; with it the difference is {significant(agreement.rms_with_gain * 1e6)} um RMS",
     ]
 
 
-def sense_sentences(outcome: SenseOutcome) -> tuple[str, ...]:
+def sense_texts(outcome: SenseOutcome) -> tuple[str, ...]:
     """Return how large the error of ``outcome`` is, and what would reduce it."""
     sensed, agreement = outcome.sensed, outcome.agreement
     if agreement is None:
@@ -157,5 +157,5 @@ def sense_json(outcome: SenseOutcome) -> dict[str, Any]:
         "conductance_S": sensed.conductance,
         "anchored_lobes": sensed.anchors,
         "excess": sensed.excess,
-        "sentences": list(sense_sentences(outcome)),
+        "sentences": list(sense_texts(outcome)),
     }

@@ -112,7 +112,7 @@ def _diagnosis(outcome: DiagnoseOutcome) -> dict[str, Any]:
         pieces.append(effect_table(outcome))
     rounds = diagnosis_tables.rankings(outcome) or (diagnosis.untried_text(outcome),)
     dropped = diagnosis_tables.dropped_effects(outcome)
-    proposal: list[str | Table] = [readable(f"{outcome.experiment_words.rstrip('.')}.")]
+    proposal: list[str | Table] = [readable(f"{outcome.experiment_text.rstrip('.')}.")]
     considered = diagnosis_tables.experiment_table(outcome)
     if considered is not None:
         proposal.append(considered)

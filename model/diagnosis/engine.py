@@ -197,7 +197,7 @@ class Search:
     def _searched(self, baseline: Fit) -> Fit:
         """Laws are sought in white noise and in drift, the more promising first."""
         judge = self.judge
-        baseline = self._humming(baseline)
+        baseline = self._with_interference_at_rest(baseline)
         settled = judge.is_settled(baseline)
         if settled and baseline.problem.noise_drift is None:
             return baseline
@@ -225,7 +225,7 @@ class Search:
         judge.see([lawful, beside])
         return min(lawful, beside, key=judge.criterion)
 
-    def _humming(self, baseline: Fit) -> Fit:
+    def _with_interference_at_rest(self, baseline: Fit) -> Fit:
         """Return ``baseline`` with interference where the readings at rest have a line.
 
         It is there without a voltage, so the film does not cause it. It is fitted first.

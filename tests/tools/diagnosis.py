@@ -183,7 +183,7 @@ def diagnose_outcome(**changes) -> DiagnoseOutcome:
         stands=_stands((train,), others),
         noise=NOISE,
         experiment=EXPERIMENT,
-        experiment_words="'fast lobes' separates best among 14 excitations within the rig's limits",
+        experiment_text="'fast lobes' separates best among 14 excitations within the rig's limits",
         quality=("train.h5: the sensor is clipped at 0.7 mm from sample 400 (4 s) on",),
         model_path="out/model.toml",
         seconds=12.3,
@@ -235,7 +235,7 @@ def nothing_missing() -> DiagnoseOutcome:
         stands=(stand, stand),
         quality=(),
         experiment=None,
-        experiment_words="No other family explains these data as well",
+        experiment_text="No other family explains these data as well",
         finding=finding(
             verdict="nothing_missing", baseline=fitted, final=fitted, steps=(), rivals=(),
             rounds=(replace(LAST, base=()),), before=(signature(clean, True),),
@@ -260,7 +260,7 @@ def film_diagnosis() -> DiagnoseOutcome:
         stands=_stands((train,), (other,)),
         noise=100.0,
         experiment=None,
-        experiment_words="The recordings are of films: sequences of voltage do not apply.",
+        experiment_text="The recordings are of films: sequences of voltage do not apply.",
         quality=(),
         finding=finding(
             verdict="partly_explained", baseline=stage(strip, 1.4e3, 100.0), steps=(step,),

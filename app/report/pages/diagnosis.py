@@ -108,7 +108,7 @@ class DiagnosisPage:
     dropped_effects: str
     after: tuple[tuple[str, tuple[str, ...]], ...]
     after_pictures: tuple[Picture, ...]
-    experiment_words: str
+    experiment_text: str
     experiments: tuple[Table, ...]
     sequence: str
     parameters: Table
@@ -197,7 +197,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
             for s in after_it
         ),
         after_pictures=_after_pictures(outcome, worst, names),
-        experiment_words=readable(_with_full_stop(outcome.experiment_words)),
+        experiment_text=readable(_with_full_stop(outcome.experiment_text)),
         experiments=() if experiments is None else (experiments,),
         sequence="" if outcome.experiment is None else outcome.experiment.sequence.strip(),
         parameters=estimate_table(finding.final, condition_text(outcome)),

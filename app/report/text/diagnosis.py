@@ -177,8 +177,8 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     if finding.unnamed is not None:
         said.append(_unnamed(outcome))
     said += outcome.performed
-    if (finding.rivals or outcome.is_rejected or outcome.experiment) and outcome.experiment_words:
-        said.append(_sentence(outcome.experiment_words))
+    if (finding.rivals or outcome.is_rejected or outcome.experiment) and outcome.experiment_text:
+        said.append(_sentence(outcome.experiment_text))
     if outcome.status == "stopped":
         said.append(
             "The search was stopped. These are the results so far; a complete search may find more."

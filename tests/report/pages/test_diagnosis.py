@@ -124,7 +124,7 @@ class TestPage:
 
     def test_the_experiment_with_its_sequence(self, page):
         outcome, read = page
-        assert outcome.experiment_words.rstrip(".") in read.words
+        assert outcome.experiment_text.rstrip(".") in read.words
         there = "[[segment]]" in read.words
         assert there == (outcome.experiment is not None)
 

@@ -93,7 +93,7 @@ def pages(folder: Path) -> list[Path]:
     made = [
         write_identify_report(fitted, folder / "identify.html"),
     ]
-    diagnosed = diagnose_outcome(**said, performed=(EVIL,), rig=EVIL, experiment_words=EVIL)
+    diagnosed = diagnose_outcome(**said, performed=(EVIL,), rig=EVIL, experiment_text=EVIL)
     finding = hostile(
         replace(diagnosed.finding, missing_before=(), missing_after=()),
         ("note", "reason", "record", "evidence"),

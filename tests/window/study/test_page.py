@@ -221,7 +221,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     outcome = studied(page, qtbot).outcome
     assert isinstance(outcome, DiagnoseOutcome)
     assert outcome.finding.steps
-    assert outcome.experiment is not None, outcome.experiment_words
+    assert outcome.experiment is not None, outcome.experiment_text
     assert outcome.experiment.name in words(page.experiment)
     assert [len(p.drawn) for p in page.residual.time] == [1, 1]
 
