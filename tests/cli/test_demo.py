@@ -78,5 +78,9 @@ def test_demo_does_the_main_job(tmp_path: Path, short_demo: None) -> None:
     assert diagnosis["verdict"] == "explained"
     before = diagnosis["baseline"]["validation"]["rms_um"]
     after = diagnosis["final"]["validation"]["rms_um"]
-    assert after < 1.15 * diagnosis["noise_floor_um"] < before
+    # in short recordings the displacement hardly shows the leak: the current does
+    assert after < min(before, 1.15 * diagnosis["noise_floor_um"])
+    assert [step["family"] for step in diagnosis["steps"]] == ["leakage"]
+    current = {c["name"]: c for c in diagnosis["channels"]}["current"]
+    assert current["after"] < 1.05 * current["noise"] < current["before"]
     assert load_model(folder / "improved.toml").model.effects
