@@ -50,7 +50,7 @@ class Feedback:
         Largest correction as a part of the planned voltage, and its largest change in 1/s. The
         gate enforces both.
     response : float
-        Response time in s of the loop, next to its delay.
+        Response time in s of the loop, besides its delay.
     ahead : float
         Time in s of the output that waits when an answer is admitted.
     laser_loss : float

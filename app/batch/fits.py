@@ -55,7 +55,7 @@ log = logging.getLogger(__name__)
 KINDS = ("identify", "diagnose", "validate")
 #: Row of the table of a study: plain values by the names of its columns.
 Row = dict[str, Any]
-#: Packages of this distribution on which the numbers depend, next to its foundations.
+#: Packages of this distribution on which the numbers depend, besides its foundations.
 _SOURCES = ("analysis", "batch", "config", "drivers", "model", "recording")
 _LIBRARIES = ("numpy", "scipy", "numba", "h5py")
 # linear algebra is limited to one thread for the whole process: fits in it go one after the other

@@ -478,7 +478,7 @@ class _Expansion:
             yield Band(found[1], found[2], limit)
 
 
-#: Numbers that each step after a run gives, next to the parameters of the model.
+#: Numbers that each step after a run gives, besides the parameters of the model.
 ERRORS = ("rms_um", "nrmse_pct", "max_um")
 
 

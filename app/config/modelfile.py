@@ -125,7 +125,7 @@ class _SpringBase(TomlTable):
         return Spring(self.modulus_Pa, limit, self.spring, tuple(getattr(self, n) for n in names))
 
 
-#: Keys of the parameters of all strain energies, next to the limit.
+#: Keys of the parameters of all strain energies, besides the limit.
 _SHAPES = tuple(
     dict.fromkeys(p.name for law in SPRING_LAWS.values() for p in law.parameters if p.name != LIMIT)
 )

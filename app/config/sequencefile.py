@@ -149,7 +149,7 @@ class _Head(TomlTable):
     )
 
 
-#: Keys of a sequence file next to its segments.
+#: Keys of a sequence file besides its segments.
 HEAD_FIELDS: Mapping[str, FieldInfo] = MappingProxyType(_Head.model_fields)
 
 

@@ -33,7 +33,7 @@ ITEMS_MAX = 10_000
 DEPTH_MAX = 32
 #: Characters of a key, at most; the longest known one has 40.
 KEY_MAX = 200
-#: Bits of a whole number next to its sign, as TOML has it.
+#: Bits of a whole number besides its sign, as TOML has it.
 INTEGER_BITS = 63
 #: Characters of a name or title, at most: more than fits into a heading or on a terminal's screen.
 NAME_MAX = 1000

@@ -3,7 +3,7 @@
 Compiled kernels are loaded as machine code, so a user who can write to their folder runs code as
 the user. The rule is that of OpenSSH's ``StrictModes``: the folder and every folder above it, with
 links resolved, belong to this user or to root, and neither group nor others may write to them. Two
-cases are allowed next to that: a folder with the sticky bit above the last one (``/tmp``: only the
+cases are allowed besides that: a folder with the sticky bit above the last one (``/tmp``: only the
 owner of an entry can rename it), and write permission for the user's private group (the group that
 has the user's name and no other member, with which some systems create every folder).
 

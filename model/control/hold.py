@@ -48,7 +48,7 @@ class HoldSettings:
     delay : float
         Time in s from the middle of these readings to the middle of the block that answers them.
     response : float
-        Response time tau in s of the closed loop, next to the delay.
+        Response time tau in s of the closed loop, besides the delay.
     authority, rate_limit : float
         Largest correction either way, and its largest change in 1/s.
     resolution : float

@@ -92,7 +92,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Round:
-    """One pass over all candidates next to the effects ``base``; ``candidates`` best first."""
+    """One pass over all candidates besides the effects ``base``; ``candidates`` best first."""
 
     base: tuple[str, ...]
     candidates: tuple[Candidate, ...]

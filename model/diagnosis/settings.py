@@ -43,7 +43,7 @@ class DiagnosisSettings:
     smoothing_s
         Standard deviation of the filter for lam' and lam'': it passes what the means resolve.
     shapes
-        Points of a Sobol sequence over the bounds of the shape parameters, next to an effect's own
+        Points of a Sobol sequence over the bounds of the shape parameters, besides an effect's own
         starts. 8 points leave no gap above a third of the range of each of two parameters; a
         pattern search goes on from the best.
     amplitudes

@@ -214,7 +214,7 @@ class Effect:
         For a general law: a function of the parameters' values by name that returns the ``Curve``
         that they describe.
     needs
-        What recordings must have next to voltage and displacement: ``temperature`` during each, or
+        What recordings must have besides voltage and displacement: ``temperature`` during each, or
         ``temperatures`` or ``humidity`` of several recordings that differ in it. Empty for most.
     law
         Its equations with the symbols of its parameters, and their source. Every effect of this

@@ -52,7 +52,7 @@ class Hook(NamedTuple):
 #:   ``end``; state and ``h`` = 0 as in ``supply``.
 #: * ``permittivity``: factor on the Maxwell stress, and on the charge.
 #: * ``charge`` V: what the effect adds to the voltage ``voltage`` at the film in the charge
-#:   Q = C (V + ...), next to its ``polarise`` and ``permittivity``. From these the charge follows
+#:   Q = C (V + ...), besides its ``polarise`` and ``permittivity``. From these the charge follows
 #:   without a hook, since the Maxwell stress is D E: Q = C V_E^2/V. Needed only where the charge is
 #:   another mean over the film than the force.
 #: * ``conduct`` A: the current that the film or its frame conducts at ``voltage`` V, where it

@@ -77,7 +77,7 @@ class Spring:
 
     @property
     def values(self) -> tuple[tuple[ShapeParameter, float], ...]:
-        """The law's parameters next to the modulus, with their values."""
+        """The law's parameters besides the modulus, with their values."""
         law = SPRING_LAWS[self.kind]
         numbers = (self.limit, *self.shape) if law.has_limit else self.shape
         return tuple(zip(law.parameters, numbers, strict=True))

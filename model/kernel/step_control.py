@@ -117,7 +117,7 @@ class Pace(NamedTuple):
 def policy_of(own: int, acting: int, exponential: bool, fidelity: int) -> Policy:
     """Return how a film with its ``own`` effects is stepped at a ``fidelity``.
 
-    Its steps suit all effects ``acting``, its own and those of the films next to it.
+    Its steps suit all effects ``acting``, its own and those of the films besides it.
     """
     moves = acting & MOVING != 0
     most = _EXPONENTIAL_SUBSTEPS_MAX if exponential else _RK4_SUBSTEPS_MAX

@@ -1,4 +1,4 @@
-"""Readings of the voltage monitor and the current next to a displacement, and their noise."""
+"""Readings of the voltage monitor and the current besides a displacement, and their noise."""
 
 from __future__ import annotations
 

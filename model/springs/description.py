@@ -14,7 +14,7 @@ LIMIT = "limit"
 
 @dataclass(frozen=True)
 class ShapeParameter:
-    """A number of a strain energy next to its modulus; a pure number.
+    """A number of a strain energy besides its modulus; a pure number.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class SpringLaw:
     source
         Where the formula was published.
     parameters
-        Next to the modulus; ``limit``, where a law has one, comes first. Three others at most.
+        Besides the modulus; ``limit``, where a law has one, comes first. Three others at most.
     starts
         Function of the greatest squared stretch of the records: parameter values, in their order,
         from which the global search starts.

@@ -1,4 +1,4 @@
-"""Metadata of a run: everything in a recording next to its samples and instruments."""
+"""Metadata of a run: everything in a recording besides its samples and instruments."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ _OPTIONS = (
     ("rate_limit", "Ra&te", 0.01, 100.0, 2, " %/s", 0.01,
      "Largest change of the correction; the gate enforces it"),
     ("response", "Re&sponse", 0.2, 3600.0, 1, " s", 1.0,
-     "Response time of the loop, next to its delay"),
+     "Response time of the loop, besides its delay"),
     ("laser_loss", "&Laser loss", 0.2, 600.0, 1, " s", 1.0,
      "Time without usable readings, after which the voltage is ramped down"),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Fields of an import next to its columns: time, specimen, film and load."""
+"""Fields of an import besides its columns: time, specimen, film and load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maxwell branches next to the network's own, for effects that creep.
+"""Maxwell branches besides the network's own, for effects that creep.
 
 As the network's branches do at small elastic strains (to second order, held at the sides as the
 film is), each follows the logarithmic strain e = ln(lam/lam_rest), with the stress

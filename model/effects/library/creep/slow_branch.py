@@ -1,4 +1,4 @@
-"""Creep by one more slow branch: a spring in series with a dashpot, next to the network."""
+"""Creep by one slow branch: a spring in series with a dashpot, in parallel with the network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Leakage that fades while the voltage stays: absorption next to what is conducted.
+"""Leakage that fades while the voltage stays: absorption besides what is conducted.
 
 After a step of the voltage the current through a dielectric falls as t^-n towards a steady one
 (J. Curie 1889; E. von Schweidler 1907). The steady one grows with a power of the field, as in
