@@ -34,8 +34,8 @@ def test(python: Path, *arguments: str) -> int:
     if code := compile_all(python):
         return code
     return run(
-        # The tests of a file stay together: what they share is made once. About a third of the time
-        # a test waits for a rig or a window: a third process uses the cores meanwhile.
+        # The tests of a file run in one process, so that fixtures are made once. Tests wait for
+        # rigs and windows about a third of the time, so a third process keeps two cores busy.
         [str(python), "-m", "pytest", "-n", "3", "--dist", "loadfile", *arguments],
         # threads of linear algebra would wait for each other
         OPENBLAS_NUM_THREADS="1",

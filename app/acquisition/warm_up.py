@@ -71,7 +71,7 @@ def compile_kernels(progress: Progress = quiet) -> None:
             record(loaded, address, rig_file, Path(folder, f"{number}.h5"), overlay=overlay)
     note = _note()
     if note is not None:
-        # without it the next start compiles nothing again, it only looks again
+        # without it the next start only looks for the kernels once more
         with contextlib.suppress(OSError):
             os.close(os.open(note, os.O_CREAT | os.O_WRONLY, 0o600))
 

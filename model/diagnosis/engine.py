@@ -343,7 +343,8 @@ class Search:
         # how many races there will be is not known: each is taken for a third of what is left
         self._done += (1.0 - self._done) / 3.0
         self.progress(
-            f"candidates besides {' + '.join(sorted(parent.members)) or 'the baseline'}", self._done
+            f"candidates added to {' + '.join(sorted(parent.members)) or 'the baseline'}",
+            self._done,
         )
         regression, extent = self._regression(parent)
         among = self.effects if among is None else among

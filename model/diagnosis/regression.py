@@ -53,7 +53,7 @@ _WEAK = 1e-3  # of the largest modulus: a branch without weight still needs infl
 class Start:
     """Where a fit begins: the numbers of an effect, and springs, in two ways.
 
-    With springs again, of ``moduli`` (1 + n,) in Pa and ``times`` (n,) in s, they are ``values``.
+    With new springs, of ``moduli`` (1 + n,) in Pa and ``times`` (n,) in s, they are ``values``.
     With the parent's, moved by ``shift`` (f,) in the parent's free coordinates, they are
     ``shifted``. ``misfit`` is the RMS, in noises of a mean, that the regression leaves.
     """

@@ -50,7 +50,7 @@ class Told:
 
     @property
     def all(self) -> list[dict]:
-        """What was told; commands run next to each other, so the order is that of their times."""
+        """The notifications in the order of their times: their commands run at the same time."""
         await_notifications()
         return [json.loads(line) for line in self.file.read_text().splitlines()]
 

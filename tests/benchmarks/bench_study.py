@@ -3,7 +3,7 @@
 ``python -m tests.benchmarks.bench_study --recordings 8``. The cluster is of real processes, which
 are killed; it needs the extra ``cluster``.
 
-``python -m tests.benchmarks.bench_study --next to 1000`` plays ``dearig study --do identify`` with
+``python -m tests.benchmarks.bench_study --beside 1000`` plays ``dearig study --do identify`` with
 two processes next to bare fits of the same recordings: ``identify_recordings`` of each path, in a
 ``multiprocessing`` pool of two. Both are whole programs, and read the files themselves. They run in
 turns of a few seconds, the other one being stopped (SIGSTOP), so that the load of the machine is

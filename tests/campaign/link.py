@@ -10,8 +10,8 @@ from types import TracebackType
 
 __all__ = ["MODES", "Link"]
 
-#: What the link does with what passes: all of it at once; none, and its connections are closed;
-#: none, and no one is told; all of it 3 s later; all of it with one byte in a thousand changed;
+#: What the link does with the bytes: forwards all immediately; closes its connections; drops all
+#: and keeps the connections open; forwards all 3 s later; changes one byte in a thousand; forwards
 #: one byte in 20 ms.
 MODES = ("whole", "cut", "silent", "delayed", "corrupted", "trickling")
 

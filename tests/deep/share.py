@@ -9,7 +9,7 @@ __all__ = ["DAYS", "VARIABLE", "share_of"]
 
 #: The environment variable that names the share, for the processes of a distributed run.
 VARIABLE = "DEARIG_DEEP_SHARE"
-#: In so many days every deep test runs once.
+#: In so many days every deep test runs once: some 16 a day, for one to two minutes.
 DAYS = 56
 
 

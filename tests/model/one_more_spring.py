@@ -18,7 +18,7 @@ from dearig.model.compiled.jit import jit
 from dearig.model.springs.description import ShapeParameter, SpringLaw
 
 SPRING = SpringLaw(
-    name="cubic", title="Cubic", summary="A cubic.", source="no one",
+    name="cubic", title="Cubic", summary="A cubic.", source="nobody",
     parameters=(ShapeParameter("bend", "b", (-1.0, 1.0), 0.0, "bend", typical=1e-2),),
     starts=lambda _: ((0.1,),),
 )

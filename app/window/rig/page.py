@@ -268,7 +268,7 @@ class RigPage(Page):
         )
 
     def _block_arming(self, faults: dict[tuple[str, str], str]) -> None:
-        """Block arming while the rig file has faults: nothing that is typed then is in force."""
+        """Block arming while the rig file has faults: a limit typed then is not in force."""
         if not faults:
             self.session.unblock(_BLOCK)
             return

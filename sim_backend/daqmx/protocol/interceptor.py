@@ -44,7 +44,7 @@ Call = Callable[[Any, Any], Any]
 
 
 class _Garbage:
-    """Stands for a request that is not a message of the protocol."""
+    """Placeholder for a request that is not a protocol message."""
 
 
 class _Places:

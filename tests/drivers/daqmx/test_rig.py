@@ -30,7 +30,7 @@ from dearig.sim_backend.faults import FaultPlan
 
 
 class Watcher:
-    """A guardian that takes down what it is told, and can die; nothing runs next to the test."""
+    """A guardian without a process: it takes the output down when asked, and can be ended."""
 
     def __init__(self) -> None:
         self.words: list[str] = []

@@ -225,7 +225,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     assert outcome.experiment.name in words(page.experiment)
     assert [len(p.drawn) for p in page.residual.time] == [1, 1]
 
-    # the improved model next to the next measurement
+    # the improved model with the next measurement
     click(qtbot, page.overlay_button)
     found = page._shown
     assert found is not None
