@@ -47,12 +47,12 @@ def mostly_deep(cases: Iterable[Any], kept: Collection[Any]) -> list[Any]:
 
 
 def one_of_each(cases: Iterable[Any], kind: Callable[[Any], object]) -> list[Any]:
-    """Return the ``pytest.param`` objects ``cases``, all but the first of each kind deep."""
+    """Return the parameters ``cases``, as ``mostly_deep`` has them, the first of each kind kept."""
     given = list(cases)
     first: dict[object, Any] = {}
     for case in given:
         first.setdefault(kind(case), case)
-    return mostly_deep(given, [case.id for case in first.values()])
+    return mostly_deep(given, [getattr(case, "id", None) or case for case in first.values()])
 
 
 def examples(full: int, suite: int) -> Callable[[_Test], _Test]:

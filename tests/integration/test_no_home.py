@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from dearig.model.compiled.jit import cache_folder
-from tests.deep import mostly_deep
 from tests.tools.command import LOBE, thesis_model, write
 from tests.tools.recordings import write_run
 
@@ -51,7 +50,7 @@ ALL = ("info run.h5", "docs --no-browser", "validate model.toml lobe.h5 --report
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize("name", mostly_deep(HOMES, ["a home that is not a folder"]))
+@pytest.mark.parametrize("name", HOMES)
 def test_every_command_goes_on(tmp_path: Path, name: str) -> None:
     home, most = HOMES[name], name == "a home in which nothing can be made"
     (tmp_path / "tmp").mkdir()

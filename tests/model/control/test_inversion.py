@@ -11,7 +11,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.simulation.actuator import Drive
 from dearig.model.simulation.stability import pull_in_voltage, static_stretch
-from tests.deep import mostly_deep
+from tests.deep import one_of_each
 from tests.tools.effect_cases import BY_VOLTAGE, THESIS, numbers, with_effect
 from tests.tools.targets import LEAD_IN, LIMITS, RATE, TAIL, path, task
 
@@ -71,11 +71,11 @@ def missed(model, found):
 
 
 STEADY = [name for name in BY_VOLTAGE if name not in UNSTEADY]
-#: One effect of each family and hook, the others are deep.
-ONE_OF_EACH = {(EFFECTS[n].family, EFFECTS[n].acts_on): n for n in reversed(STEADY)}
 
 
-@pytest.mark.parametrize("name", mostly_deep(STEADY, ONE_OF_EACH.values()))
+@pytest.mark.parametrize(
+    "name", one_of_each(STEADY, lambda name: (EFFECTS[name].family, EFFECTS[name].acts_on))
+)
 def test_the_simulated_film_follows_the_target_of_its_inverse(name):
     model = with_effect(THESIS, name, numbers(name))
     found = inverted(model, path())

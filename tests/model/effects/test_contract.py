@@ -9,7 +9,7 @@ from dearig.model import effects
 from dearig.model.effects import EFFECTS
 from dearig.model.effects_contract import check_effect
 from dearig.model.errors import ModelError
-from tests.deep import mostly_deep
+from tests.deep import mostly_deep, one_of_each
 from tests.tools.effect_plugin import FEW, add_distribution, run_with
 
 HEAD = '''"""A made effect."""
@@ -157,11 +157,8 @@ for name, origin in ORIGINS.items():
 )
 
 
-#: Hooks that are compiled one by one are dear: the suite has an effect of each family.
-ONE_OF_EACH = {effect.family: name for name, effect in reversed(EFFECTS.items())}
-
-
-@pytest.mark.parametrize("name", mostly_deep(EFFECTS, ONE_OF_EACH.values()))
+# hooks are compiled one by one: the suite has an effect of each family
+@pytest.mark.parametrize("name", one_of_each(EFFECTS, lambda name: EFFECTS[name].family))
 def test_every_effect_keeps_the_contract(name):
     check_effect(name)
 

@@ -33,7 +33,7 @@ from dearig.model.film.material import THESIS_FILM
 from dearig.model.simulation.actuator import Drive, at_rest, initial_state
 from dearig.model.simulation.strip import Strip
 from dearig.sim_backend.model_plant import ModelPlant
-from tests.deep import mostly_deep
+from tests.deep import one_of_each
 from tests.tools.effect_cases import (
     BOTH,
     BY_STRETCH,
@@ -242,14 +242,14 @@ SPLITTING = {
 }
 
 
-#: Of each family and hook the effect with the fewest states, which the oracle carries in Python.
-ONE_OF_EACH = {
-    (EFFECTS[n].family, EFFECTS[n].acts_on): n
-    for n in sorted(OF_FILM, key=lambda n: EFFECTS[n].memory, reverse=True)
-}
-
-
-@pytest.mark.parametrize("name", mostly_deep(OF_FILM, ONE_OF_EACH.values()))
+# the oracle carries the states in Python: the suite has the effects with the fewest
+@pytest.mark.parametrize(
+    "name",
+    one_of_each(
+        sorted(OF_FILM, key=lambda name: EFFECTS[name].memory),
+        lambda name: (EFFECTS[name].family, EFFECTS[name].acts_on),
+    ),
+)
 def test_against_the_oracle(name):
     film = Film(THESIS)
     values = numbers(name, 5.0)

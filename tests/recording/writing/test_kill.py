@@ -72,7 +72,6 @@ def test_a_kill_at_a_random_moment_loses_nothing_flushed(tmp_path: Path, seed: i
     assert not recover(path)
 
 
-@pytest.mark.deep
 @pytest.mark.parametrize("blocks", mostly_deep([400, 4000], [400]))
 def test_a_kill_while_closing_leaves_a_whole_file_or_all_counts(
     tmp_path: Path, blocks: int

@@ -447,7 +447,7 @@ def test_the_layout_is_remembered_and_can_be_reset(
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize("models", mostly_deep([1, 2], [2]))
+@pytest.mark.parametrize("models", [1, 2])
 def test_nothing_is_cut_in_the_smallest_window(
     qtbot: QtBot, window: MainWindow, models: int
 ) -> None:
