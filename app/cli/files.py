@@ -308,14 +308,14 @@ def export(
     force: Force = False,
 ) -> None:
     """Convert a recording to CSV, MAT or Parquet."""
-    from dearig.recording.content.beside import path_beside
+    from dearig.recording.content.table_description import description_path
     from dearig.recording.exporters import EXPORTS, export_recording
 
     check_files(force, (path,), *optional(out), json=json)
     written = export_recording(path, to, out, force)
     print_line(console_for(json), str(written))
-    if (beside := path_beside(written)).exists() and not EXPORTS[to].describes:
-        print_line(console_for(json), f"{beside}: units, events and film, for an import")
+    if (described := description_path(written)).exists() and not EXPORTS[to].describes:
+        print_line(console_for(json), f"{described}: units, events and film, for an import")
     write_result(
         {
             "format": "dearig-export/1",

@@ -12,7 +12,7 @@ from typing import Any
 
 from dearig.drivers.registry import Registry
 from dearig.errors import InputError
-from dearig.recording.content.beside import path_beside, write_beside
+from dearig.recording.content.table_description import description_path, write_description
 from dearig.recording.exporters.table import Exporter, description_of, units_of
 from dearig.recording.files import check_output, file_sha256, replaced_when_done
 from dearig.recording.reading.reader import open_recording
@@ -55,14 +55,14 @@ def export_recording(
         raise InputError(f"a recording is exported to {', '.join(EXPORTS)}, not to {to!r}")
     exporter = EXPORTS[to]
     out = check_output(path.with_suffix(f".{to}") if out is None else out, overwrite, path)
-    beside = None if exporter.describes else check_output(path_beside(out), overwrite, path)
+    beside = None if exporter.describes else check_output(description_path(out), overwrite, path)
     recording = open_recording(path)
     with replaced_when_done(out, overwrite) as partial:
         exporter.write(recording, partial)
         if beside is not None:
             digest = file_sha256(partial)
             with replaced_when_done(beside, overwrite) as description:
-                write_beside(
+                write_description(
                     description, out.name, digest, units_of(recording), description_of(recording)
                 )
     return out

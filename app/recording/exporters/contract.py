@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.drivers.registry import EntryError
-from dearig.recording.content.beside import path_beside
+from dearig.recording.content.table_description import description_path
 from dearig.recording.exporters import EXPORTS, export_recording
 from dearig.recording.exporters.table import columns_of
 from dearig.recording.importers import IMPORTERS, import_file
@@ -32,7 +32,7 @@ def check_exporter(
     """
     before = recording.read_bytes()
     out = export_recording(recording, name, folder / f"exported.{name}")
-    written = {out.name} if EXPORTS[name].describes else {out.name, path_beside(out).name}
+    written = {out.name} if EXPORTS[name].describes else {out.name, description_path(out).name}
     if {path.name for path in folder.iterdir()} != written:
         raise EntryError(f"{name}: it writes other files than the one asked for")
     if not out.stat().st_size:

@@ -14,11 +14,11 @@ from dearig.errors import InputError, Note, hints_of
 from dearig.model.film.specimen import KINEMATICS, Film, Load
 from dearig.progress import Progress, part, quiet
 from dearig.recording.content.assumed import ASSUMED, FILM_VALUES, assumed_of
-from dearig.recording.content.beside import description_beside, path_beside
 from dearig.recording.content.layout import AVERAGE_COLUMN
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.content.provenance import FROM_IMPORT, START_FROM
 from dearig.recording.content.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
+from dearig.recording.content.table_description import description_path, read_description
 from dearig.recording.files import check_output, file_sha256
 from dearig.recording.importers.columns.choose import choose
 from dearig.recording.importers.columns.chosen import (
@@ -267,13 +267,14 @@ def prepare(
 
 def exported_from(table: Source) -> tuple[Exported, list[str]]:
     """Return the metadata of the recording that ``table`` was exported from, with doubts."""
-    if table.about or not path_beside(table.path).is_file():
+    if table.about or not description_path(table.path).is_file():
         return exported(table.about), []
-    about = description_beside(table.path, file_sha256(table.path))
+    about = read_description(table.path, file_sha256(table.path))
     if about is not None:
         return exported(about), []
     return Exported(), [
-        f"{path_beside(table.path).name} does not describe this table as it is, and was not used"
+        f"{description_path(table.path).name} does not describe this table as it is, "
+        f"and was not used"
     ]
 
 

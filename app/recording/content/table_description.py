@@ -13,7 +13,7 @@ from typing import Any
 
 from dearig.recording.content.layout import FORMAT
 
-__all__ = ["description_beside", "path_beside", "write_beside"]
+__all__ = ["description_path", "read_description", "write_description"]
 
 #: Bytes of such a file that are read, at most.
 BYTES_MAX = 2**24
@@ -21,12 +21,12 @@ _ENDING = "-metadata.json"
 _CONTEXT = "http://www.w3.org/ns/csvw"
 
 
-def path_beside(table: Path) -> Path:
+def description_path(table: Path) -> Path:
     """Return the path of the description of ``table``, by the rule of CSVW."""
     return table.with_name(table.name + _ENDING)
 
 
-def write_beside(
+def write_description(
     path: Path, name: str, sha256: str, units: Mapping[str, str], about: Mapping[str, str]
 ) -> None:
     """Write the description of the table ``name`` to ``path``.
@@ -47,12 +47,12 @@ def write_beside(
     path.write_text(json.dumps(content, indent=1) + "\n", "utf-8", newline="\n")
 
 
-def description_beside(table: Path, sha256: str) -> dict[str, str] | None:
+def read_description(table: Path, sha256: str) -> dict[str, str] | None:
     """Return what the file next to ``table``, which has that ``sha256``, says of it, as texts.
 
     None where it describes another table.
     """
-    for note in _notes(path_beside(table)):
+    for note in _notes(description_path(table)):
         match note:
             case {"format": str(form), "sha256": str(digest), "about": dict(about)}:
                 if form == FORMAT and digest == sha256:
