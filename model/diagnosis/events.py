@@ -61,7 +61,7 @@ def own_of(
     may_drift: bool = True,
     others: Sequence[Record] = (),
 ) -> Own | None:
-    """Return the events and the drift of ``record`` next to ``model``; None in white noise alone.
+    """Return the events and the drift of ``record`` besides ``model``; None in white noise alone.
 
     With ``may_drift`` False a slow error is not taken for drift: a missing law can be as slow. The
     readings at rest of ``others``, recordings with the same sensor, tell the colour of its noise

@@ -197,7 +197,7 @@ def main() -> None:
     parser.add_argument("--generator", choices=tuple(GENERATORS), default="first", help="[first]")
     parser.add_argument("--noise", choices=NOISES, default=WHITE, help="[white]")
     parser.add_argument("--rate", type=float, default=200.0, help="Hz [200]")
-    parser.add_argument("--only", help="names of variants next to the whole, with commas between")
+    parser.add_argument("--only", help="names of variants besides the whole, with commas between")
     parser.add_argument("--effort", type=float, help="integration steps of a search [its own]")
     parser.add_argument("--keep", type=Path, help="append a line of JSON for each rig to this file")
     given = parser.parse_args()

@@ -2,7 +2,7 @@
 
 Run as ``python -m tests.benchmarks.bench_coverage --rigs 100``, with ``--diagnose`` for the other.
 Each rig has a film of two to four branches (``--branches``, ``--near``) and one noise, drawn by its
-seed; ``--diagnose`` gives it one effect of a list next to that, in turn. With ``--hidden`` the rigs
+seed; ``--diagnose`` gives it one effect of a list besides, in turn. With ``--hidden`` the rigs
 are those of the blind test that hide an effect: `identify` has a model without it, and only the
 intervals of fits that it does not call rejected are counted. Each rig makes the thesis's
 identification record, with a lead-in of 2 s, white noise, and the steps of a 16-bit converter,

@@ -1,4 +1,4 @@
-"""What derivatives cost: this revision, and another one next to it in the same run.
+"""What derivatives cost: this revision and another one, in the same run.
 
 Run as ``python -m tests.benchmarks.bench_derivatives [PYTHON]``. ``PYTHON`` is the interpreter
 of another checkout's environment. The two take turns, each in a process of its own, on one thread;

@@ -1,4 +1,4 @@
-"""How long an identification takes: hybrid next to Algorithm 1, and this revision next to another.
+"""How long an identification takes: hybrid and Algorithm 1, and this revision and another.
 
 Run as ``python -m tests.benchmarks.bench_identify [PYTHON [commands [SEED ...]]]``. Without an
 argument: one period of the thesis's identification record at its 10 ms sampling, made by Table 3's

@@ -1,4 +1,4 @@
-"""Time and memory of importing a CSV file of three million rows, next to pandas and pyarrow.
+"""Time and memory of importing a CSV file of three million rows, compared with pandas and pyarrow.
 
 Run as ``python -m tests.benchmarks.bench_import [--rows N]``. Each reading is a process of its own.
 Other programs use the machine too: the least of some runs is printed, and medians of ratios to

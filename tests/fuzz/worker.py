@@ -14,7 +14,7 @@ from tests.fuzz.targets import TARGETS, seeds_of
 
 __all__ = ["complaint", "input_of"]
 
-#: Bytes of address space next to what the libraries take: what a small file may cost.
+#: Bytes of address space besides what the libraries take: what a small file may cost.
 MEMORY = 2**31
 #: Longer than this no sentence is.
 SENTENCE = 3000

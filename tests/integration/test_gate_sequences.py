@@ -102,7 +102,7 @@ def test_no_sample_of_any_sequence_is_beyond_a_limit(parts, stopped_at):
 
 
 def check_limits(waveform: GatedWaveform, voltage: np.ndarray) -> None:
-    # what goes out are counts of the converter, half of one next to the sample at most
+    # what goes out are counts of the converter, half of one from the sample at most
     out = Scaling((0.0, 10.0 / 32768.0), 1000.0).physical(
         Scaling((0.0, 10.0 / 32768.0), 1000.0).counts(voltage)
     )

@@ -25,13 +25,13 @@ __all__ = ["Cost", "Measured", "measuring"]
 
 #: s after which a command counts as one that hangs: far more than any takes on a busy machine.
 PATIENCE = 120
-#: Bytes of address space that a command gets next to what the interpreter has.
+#: Bytes of address space that a command gets besides what the interpreter has.
 MEMORY = 2**31
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Exit code (negative: the signal that ended it), texts, s, and bytes next to an idle one."""
+    """Exit code (negative: the signal that ended it), texts, s, and bytes more than an idle one."""
 
     code: int
     out: bytes

@@ -21,7 +21,7 @@ pytestmark = [
     pytest.mark.timeout(600),
 ]
 
-#: Bytes that a command may take next to its input: what a simulated run, libraries that it loads
+#: Bytes that a command may take besides its input: what a simulated run, libraries that it loads
 #: and their compiled code take.
 BASE = 250_000_000
 #: Bytes that a command may take for each byte of its input.

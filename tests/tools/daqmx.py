@@ -248,7 +248,7 @@ def play_finite(
 
 
 def in_thread(call: Callable[[], object]) -> Callable[[], object]:
-    """Begin ``call`` next to the test; what is given back waits for its result."""
+    """Begin ``call`` in another thread; what is given back waits for its result."""
     results: list[object] = []
 
     def run() -> None:

@@ -1,4 +1,4 @@
-"""A thermo-hygrometer next to a run: its newest value, and never an old one as a present one."""
+"""A thermo-hygrometer during a run: its newest value, and never an old one as a present one."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ IN_HALF = {"viscoplastic flow"}
 def courses(part=1.0):
     """The thesis's excitation and the rich one, in rooms that differ and change meanwhile."""
     drives = []
-    rooms = ((-3.0, -0.15), (3.0, 0.15))  # K and relative humidity next to the reference
+    rooms = ((-3.0, -0.15), (3.0, 0.15))  # K and relative humidity from the reference
     sequences = (Sequence.thesis(periods=1), load_sequence("rich"))
     for sequence, (temperature, humidity) in zip(sequences, rooms, strict=True):
         time, voltage = (a[: round(part * a.size)] for a in sequence.sample(RATE))

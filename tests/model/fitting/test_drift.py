@@ -1,4 +1,4 @@
-"""Drift of each recording on its own, next to the parameters that recordings share."""
+"""Drift of each recording on its own, besides the parameters that recordings share."""
 
 from __future__ import annotations
 

@@ -537,7 +537,7 @@ def test_work_is_counted_in_steps_and_in_populations():
     assert four[1] == one[1]
     steps = five[1] - four[1]
     assert steps >= samples - 1
-    # a population takes something next to its steps
+    # a population takes something besides its steps
     assert one[1] - steps == pytest.approx(1.5e4)
     # careful steps are shorter, and an effect that moves the film takes a part of each
     assert work(plain, kernel.CAREFUL)[1] > one[1] + samples
