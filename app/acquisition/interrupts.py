@@ -8,7 +8,15 @@ import weakref
 from collections.abc import Callable
 from types import FrameType
 
-__all__ = ["Interrupts", "ends_program", "ignore_interrupts", "terminal_closed"]
+__all__ = [
+    "Interrupts",
+    "ends_program",
+    "ignore_interrupts",
+    "interrupted",
+    "note_interrupts",
+    "raise_interrupt",
+    "terminal_closed",
+]
 
 # the voltage must not stay on when a terminal is closed or a service stopped
 _REASONS = {
@@ -31,6 +39,39 @@ def ends_program() -> None:
     """Let the end of a run by ctrl-C be the end of this program: further ones are ignored."""
     global _ends_program
     _ends_program = True
+
+
+_pressed = False
+
+
+def note_interrupts() -> None:
+    """Note each ctrl-C outside a run, which raises as before.
+
+    Compiled code, such as that of libraries while they are imported, can drop the exception, or
+    wrap it into another one. No run starts after it.
+    """
+    if (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) == signal.default_int_handler
+    ):
+        signal.signal(signal.SIGINT, _note)
+
+
+def _note(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+    global _pressed
+    _pressed = True
+    raise KeyboardInterrupt
+
+
+def interrupted() -> bool:
+    """Return True if ctrl-C was noted outside a run."""
+    return _pressed
+
+
+def raise_interrupt() -> None:
+    """Raise ``KeyboardInterrupt`` if one was noted outside a run."""
+    if _pressed:
+        raise KeyboardInterrupt
 
 
 def ignore_interrupts() -> None:
@@ -58,7 +99,8 @@ class Interrupts:
     the samples around the ramp to 0 V would be lost. The second ends a run on a rig that does not
     answer. A terminal that is closed sends its signal more than once: it counts once. Handlers that
     a host program has set stay, and ignored signals stay ignored. Outside the main thread nothing
-    is installed, because signals are not delivered there.
+    is installed, because signals are not delivered there. A ctrl-C that was noted before
+    (``note_interrupts``) is raised when the context is entered.
     """
 
     def __init__(self) -> None:
@@ -117,9 +159,12 @@ class Interrupts:
                 if number is None:
                     continue
                 before = signal.getsignal(number)
-                if before in (signal.SIG_DFL, signal.default_int_handler):
+                if before in (signal.SIG_DFL, signal.default_int_handler, _note):
                     self._before[number] = before
                     signal.signal(number, self._handle)
+        if _pressed:  # looked at last: from here on a press is asked, not noted
+            self.__exit__()
+            raise KeyboardInterrupt
         return self
 
     def __exit__(self, *_: object) -> None:

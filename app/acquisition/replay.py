@@ -73,12 +73,18 @@ class Original:
             return (f"{self.path} was recorded with the same rig file",)
         return (f"{self.path} was recorded with another rig file; what differs:", *found)
 
-    def check_film(self, rig_file: RigFile) -> None:
+    def check_film(self, rig_file: RigFile, model: Path | None) -> None:
         """Raise ``InputError`` unless film and load of ``rig_file`` are those of the original.
 
-        They differ where the simulated rig was made from a model file.
+        They differ where the simulated rig was made from a model file, which ``model`` should be.
         """
         if (self.film, self.load) != (rig_file.as_film(), rig_file.as_load()):
+            if model is not None:
+                raise InputError(
+                    f"film or load of the model {model} differ from those that {self.path} was "
+                    f"recorded with: give the model of that run, or none",
+                    option=("model", "like"),
+                )
             raise InputError(
                 f"{self.path} was made with the film and load of a model file, which differ from "
                 f"those of its rig file: give the model file too",

@@ -17,8 +17,8 @@ from typing import Any
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.plan import plan
-from dearig.acquisition.rigs import is_simulated, kind_of
-from dearig.acquisition.run import RunObserver, RunOptions, record
+from dearig.acquisition.rigs import is_simulated
+from dearig.acquisition.run import RunObserver, RunOptions, check_address, record
 from dearig.batch.after import Compute, band_violation, compute
 from dearig.batch.extremes import write_extremes
 from dearig.batch.forecast import Forecast, foresee
@@ -80,6 +80,16 @@ class Arming:
     acknowledged: str = ""
     shown: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Take texts that show nothing, such as a space, for none."""
+        for name in ("by", "acknowledged"):
+            object.__setattr__(self, name, _visible(getattr(self, name)))
+
+
+def _visible(text: str) -> str:
+    """Return ``text`` without spaces around it; "" where it has no visible character."""
+    return text.strip() if any(c.isprintable() and not c.isspace() for c in text) else ""
+
 
 def play_campaign(
     campaign: Campaign,
@@ -115,12 +125,10 @@ def play_campaign(
     turn; ``SafetyStop``, ``InstrumentFault`` or ``NotSafe`` where a run ended so that a person must
     look; ``Interrupted`` where the operator ended it. The journal has it all.
     """
-    kind_of(address)  # refuses what is not a rig
-    if options.actuator is not None and address != "sim":
-        raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
     _check_folder(folder, resume)
     if not resume:
         _check_arming(arming, address, left=False)
+    check_address(address, rig_file, options)
 
     def planning(stage: str, part: float) -> None:
         if interrupts is not None and interrupts.asked():

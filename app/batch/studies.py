@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -87,6 +88,11 @@ def subjects_of(sources: Sequence[Path], out: Path) -> list[Subject]:
         if subject.name in names:
             raise InputError(f"{subject.name} is given twice; give each recording once")
         names.add(subject.name)
+    named: dict[str, str] = {}
+    for subject in found:
+        other = named.setdefault(os.path.realpath(subject.path), subject.name)
+        if other != subject.name:
+            raise InputError(f"{subject.name} and {other} are one file; give each recording once")
     return found
 
 

@@ -220,8 +220,10 @@ def campaign_queue(
     if requests:
         ask(folder, requests, operator)
         what = ", ".join(f"{kind} {name}".strip() for kind, name in requests)
-        print_line(console, f"{folder}: asked to {what}; it takes effect between two runs")
     outcome = seen(folder)
+    if requests:
+        when = "when the campaign is continued" if outcome.status else "between two runs"
+        print_line(console, f"{folder}: asked to {what}; it takes effect {when}")
     if not requests:
         console.print(campaign_runs(outcome))
     write_result(campaign_json(outcome), json)

@@ -419,17 +419,20 @@ def simulate(
     force: Force = False,
 ) -> None:
     """Compute what a model predicts under a recorded or planned drive, with its 95 % band."""
+    from dearig.acquisition.rig_source import film_differences
     from dearig.analysis.simulate import save_prediction, simulate_model
     from dearig.config.rigfile import load_rig_file
+    from dearig.model.simulation.actuator import Actuator
     from dearig.report.text.bands import NO_BAND, band_json, band_texts
     from dearig.report.text.sentences import pull_in_text
 
     check_files(force, (model, drive, rig_file), out, *optional(report), json=json)
+    settings = None if rig_file is None else load_rig_file(rig_file)
     with working(json) as (console, _):
         prediction = simulate_model(
             model,
             drive,
-            rig_file=load_rig_file(rig_file),
+            rig_file=settings,
             voltage=voltage.value,
             band=band,
         )
@@ -439,6 +442,10 @@ def simulate(
 
             Prediction(prediction).to_html(report)
     print_line(console, str(written))
+    simulated = prediction.model.model
+    if settings is not None and isinstance(simulated, Actuator):
+        for text in film_differences(simulated.film, simulated.load, settings):
+            print_line(console, text, "yellow")
     if report is not None:
         print_line(console, f"Report: {report}")
     if prediction.band is not None:

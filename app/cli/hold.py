@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from dearig.acquisition.run import RunObserver
     from dearig.model.control import HoldAnswer
+    from dearig.model.simulation.actuator import Actuator
     from dearig.progress import Progress
 
 __all__ = ["commands"]
@@ -123,9 +124,16 @@ def hold(
         rise_s, authority_pct / 100.0, rate_pct_per_s / 100.0, response_s, ahead_s, laser_loss_s
     )
     setpoint = displacement * 1e-3
+
+    def announce(console: Console, actuator: Actuator) -> None:
+        other = film_differences(actuator.film, actuator.load, settings)
+        announce_rig(console, rig, settings, provenance[SOURCE], other)
+
     if check:
         with working(json) as (console, progress):
-            planned = plan_hold(setpoint, length, actuator_of(ours), settings, options)
+            actuator = actuator_of(ours)
+            announce(console, actuator)
+            planned = plan_hold(setpoint, length, actuator, settings, options)
             found = check_hold(planned, settings, run_options, progress)
         write_result({"format": "dearig-hold-check/1", **found}, json)
         print_line(
@@ -139,8 +147,7 @@ def hold(
         raise InputError("--out FILE.h5 is missing: the recording is written there")
     with working(json, whole=True) as (console, progress):
         actuator = actuator_of(ours)
-        other = film_differences(actuator.film, actuator.load, settings)
-        announce_rig(console, rig, settings, provenance[SOURCE], other)
+        announce(console, actuator)
         observer, shown = _live(console, progress)
         outcome = run(
             setpoint, length, ours, rig, settings, out, run_options, options, observer=observer,

@@ -25,7 +25,7 @@ import typer
 from typer.exceptions import TyperException
 
 from dearig import log_file
-from dearig.acquisition.interrupts import ends_program, ignore_interrupts
+from dearig.acquisition.interrupts import ends_program, ignore_interrupts, interrupted
 from dearig.cli import campaign, files, fit, hold, run, study, tools, track, trends, watch
 from dearig.cli.last_words import (
     LastingStream,
@@ -221,6 +221,10 @@ def _run(written: log_file.LogFile) -> int:
     except KeyboardInterrupt:
         return _interrupted()
     except Exception as error:
+        if interrupted():
+            # such as by a library whose import was broken off
+            log.info("interrupted", exc_info=True)
+            return _interrupted()
         exhausted = _exhausted(error)
         if exhausted:
             log.exception(exhausted)

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
+from dearig.acquisition.interrupts import raise_interrupt
 from dearig.cli.console import PrintableConsole
 from dearig.cli.lost_interrupt import raise_lost
 from dearig.printable import printable
@@ -47,6 +48,7 @@ def progress(
     work, and a new stage only changes the bar's text. With ``computes`` the text counts the kernels
     while any are compiled. Nothing is written where standard error is not a terminal.
     """
+    raise_interrupt()  # one that an import has dropped
     console = PrintableConsole(stderr=True) if console is None else console
     if not console.is_terminal:
         yield _unseen

@@ -149,10 +149,15 @@ def record(
         told = original.differences(rig, rig_file, settings)
     actuator = None
     if model is not None:
+        if original is not None and rig != "sim":
+            raise InputError(
+                f"{like} was recorded on {rig}, which has a film of its own and takes no model; "
+                f"leave --model out"
+            )
         actuator = load_actuator(model)
         settings = of_rig(settings, actuator.film, actuator.load)
     if original is not None and simulated:
-        original.check_film(settings)
+        original.check_film(settings, model)
     overlaid = None
     if overlay is not None:
         overlaid = OverlayModel(

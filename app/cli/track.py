@@ -123,8 +123,10 @@ def track(
     loaded, (settings, text, provenance) = load_target(target), rig_settings(rig_file)
     ours = load_model(model)
     actuator = load_actuator(model)  # refuses that of a bare film
+    other = film_differences(actuator.film, actuator.load, settings)
     if check:
         with working(json) as (console, _):
+            announce_rig(console, rig, settings, provenance[SOURCE], other)
             found = plan_target(loaded, actuator, settings)
         outcome = TrackOutcome(loaded, ours, rig, found, within_um * 1e-6)
         write_result(track_json(outcome), json)
@@ -140,10 +142,7 @@ def track(
     )  # fmt: skip
     report = out / "report.html"
     with working(json) as (console, progress):
-        announce_rig(
-            console, rig, settings, provenance[SOURCE],
-            film_differences(actuator.film, actuator.load, settings),
-        )  # fmt: skip
+        announce_rig(console, rig, settings, provenance[SOURCE], other)
 
         def finish(outcome: TrackOutcome) -> None:
             """Write and show what was done."""

@@ -52,11 +52,19 @@ def test_a_run_of_a_model_file_needs_it_again(tmp_path: Path) -> None:
     model = thesis_model(tmp_path / "model.toml")
     record = ("record", lobe, "--rig-file", rig_file, "--model", model, "--out", first)
     assert dearig(*record).code == 0
-    refused = dearig("record", "--like", first, "--out", again)
-    assert refused.code == 2
-    assert "give the model file too (--model)" in refused.err
+    without = dearig("record", "--like", first, "--out", again)
+    refused(without, "give the model file too (--model)")
     done("record", "--like", first, "--model", model, "--out", again)
     assert same(first, again)
+    longer = write(
+        tmp_path / "longer.toml", model.read_text().replace("length_m = 0.075", "length_m = 0.09")
+    )
+    other = dearig("record", "--like", first, "--model", longer, "--out", tmp_path / "no.h5")
+    refused(other, "give the model of that run, or none (--model")
+    hidden = tmp_path / "hidden.h5"
+    done("record", lobe, "--rig", "sim:7", "--rig-file", rig_file, "--out", hidden)
+    other = dearig("record", "--like", hidden, "--model", model, "--out", tmp_path / "no.h5")
+    refused(other, "was recorded on sim:7, which has a film of its own", "leave --model out")
 
 
 def test_what_cannot_be_repeated(tmp_path: Path) -> None:

@@ -174,6 +174,8 @@ def test_an_interlock_and_a_fault_halt_until_a_person_has_looked(bench: Bench, e
         bench.play(plan, resume=True)
     with pytest.raises(InputError, match="needs the name of who looked"):
         bench.play(plan, Arming(acknowledged="looked"), resume=True)
+    with pytest.raises(InputError, match="the campaign is halted: run three-0001"):
+        bench.play(plan, Arming("Ada", acknowledged=" "), resume=True)
     assert bench.played.total() == 1
     assert bench.play(plan, LOOKED, resume=True).status == "complete"
     # what an interlock ended is never repeated
@@ -293,7 +295,8 @@ def test_a_survey_says_of_every_run_why_it_is_refused(bench: Bench) -> None:
 
 def test_a_real_rig_is_armed_by_a_person_for_runs_and_hours(bench: Bench) -> None:
     bench.simulated = False
-    for arming in (Arming(), Arming("Ada"), Arming("Ada", runs=2), Arming(runs=2, hours=1.0)):
+    nobody = Arming(" \t\u200b", runs=2, hours=1.0)
+    for arming in (Arming(), Arming("Ada"), Arming("Ada", runs=2), Arming("", 2, 1.0), nobody):
         with pytest.raises(InputError, match="say who arms it, for how many runs"):
             bench.continued(arming=arming)
     assert bench.play(arming=Arming("Ada", 2, 1.0)).status == "armed_runs"

@@ -200,6 +200,9 @@ def test_a_list_names_recordings_beside_it(shelf: Path, tmp_path: Path) -> None:
     ]  # fmt: skip
     with pytest.raises(InputError, match="is given twice"):
         subjects_of([chosen, chosen], tmp_path)
+    chosen.write_text(f"recordings/{FIRST}\n{shelf / 'recordings' / FIRST}\n", "utf-8")
+    with pytest.raises(InputError, match="are one file"):
+        subjects_of([chosen], tmp_path)
 
 
 def test_an_interrupted_study_says_what_is_kept(

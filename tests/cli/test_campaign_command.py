@@ -93,3 +93,18 @@ def test_the_written_plan_can_be_checked(tmp_path: Path) -> None:
     plan = tmp_path / "plan.toml"
     done("campaign-file", plan)
     assert done("campaign", plan, "--out", tmp_path / "out", "--check").code == 0
+
+
+def test_a_card_without_a_film_leaves_nothing_behind(given, tmp_path: Path) -> None:
+    before = names(tmp_path)
+    card = ("--rig", "daqmx:Dev1", "--operator", "Ada", "--runs", 1, "--hours", 1)
+    answer = dearig("campaign", *given, *card)
+    assert answer.code == 2
+    assert "no film is declared; give a rig file" in answer.err
+    assert names(tmp_path) == before
+
+
+def test_what_is_asked_of_a_campaign_that_nobody_plays_says_so(given, tmp_path: Path) -> None:
+    done("campaign", *given)
+    answer = done("campaign-queue", tmp_path / "out", "--end")
+    assert "asked to end; it takes effect when the campaign is continued" in answer.out

@@ -33,6 +33,14 @@ def test_a_check_plays_nothing(options, tmp_path: Path) -> None:
     assert answer.json["delay_s"] == pytest.approx(0.6)
     assert answer.json["voltage_kV"] < answer.json["highest_kV"]
     assert names(tmp_path) == before
+    # on a card it says which limits apply, and that the model is of another film
+    card = write(tmp_path / "card.toml", "[film]\nlength_mm = 60.0\n" + SLOW_RIG)
+    answer = done(
+        "hold", "0.2", *options[:2], "--rig-file", card, *options[4:], "--rig", "daqmx:Dev1",
+        "--check",
+    )  # fmt: skip
+    assert "scaling and limits are those of rig file" in answer.out
+    assert "length: 0.075 in the model, 0.06 in the rig file" in answer.out
 
 
 def test_a_run_that_an_interlock_ends_has_its_exit_code(options, tmp_path: Path) -> None:

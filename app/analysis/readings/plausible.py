@@ -30,7 +30,7 @@ def check_units(recording: Recording, moved: np.ndarray) -> None:
     if peak > VOLTAGE.possible.high:
         raise InputError(
             f"{recording.path}: the voltage reaches {peak * 1e-3:.4g} kV {at}, which no film "
-            f"survives; is it in mV, and was it imported as V or kV?"
+            f"survives; is it in V, and was it imported as kV, or in mV, and was it imported as V?"
         )
     if peak < VOLTAGE.possible.low:
         raise InputError(

@@ -236,7 +236,7 @@ UNITS = {
     ),
     "volts as kilovolts": (
         scaled(lobes(), "voltage_command", 1e3),
-        ["voltage reaches 6000 kV", "sample", "is it in mV"],
+        ["voltage reaches 6000 kV", "sample", "is it in V, and was it imported as kV"],
     ),
     "no voltage": (
         scaled(lobes(), "voltage_command", 0.0),
