@@ -8,7 +8,7 @@ replacing it leaves them stale.
 import sys
 from pathlib import Path
 
-from bootstrap import run
+from bootstrap import start, wait
 from links import make
 
 #: The commands, each with its name.
@@ -22,12 +22,9 @@ CHECKS = {
 
 
 def check(python: Path, *names: str) -> int:
-    """Run the checks of these ``names``, or all; return the exit code of the first that fails."""
-    links = make()
-    for name in names or CHECKS:
-        if code := run([str(python), *CHECKS[name]], PYTHONPATH=str(links)):
-            return code
-    return 0
+    """Run the checks of these ``names``, or all, at once; return the first exit code but 0."""
+    links = str(make())
+    return wait(*(start([str(python), *CHECKS[n]], PYTHONPATH=links) for n in names or CHECKS))
 
 
 if __name__ == "__main__":

@@ -25,7 +25,10 @@ def compile_all(python: Path) -> int:
     if not run([str(python), "-c", COLD]):
         return 0
     print("Compiling the numerical kernels, once for these sources ...", flush=True)
-    return wait(*(start([str(python), "-c", DEAF + code], quiet=True) for code in (RUNS, FITS)))
+    # numba colours each message of an overload that it tries, though nobody reads them
+    plain = {"NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
+    commands = ([str(python), "-c", DEAF + code] for code in (RUNS, FITS))
+    return wait(*(start(command, quiet=True, **plain) for command in commands))
 
 
 def test(python: Path, *arguments: str) -> int:

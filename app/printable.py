@@ -10,7 +10,7 @@ from __future__ import annotations
 import unicodedata
 from typing import TextIO
 
-__all__ = ["MESSAGE_MAX", "PrintableStream", "no_formula", "printable", "unmarked"]
+__all__ = ["MESSAGE_MAX", "PrintableStream", "no_formula", "printable", "unmarked", "visible"]
 
 #: Unicode categories that are shown as escapes: controls, formats (bidirectional overrides, tags,
 #: zero-width space), lone surrogates, private use, unassigned, line and paragraph separators.
@@ -82,3 +82,8 @@ class PrintableStream:
 
     def __getattr__(self, name: str) -> object:
         return getattr(self.rich_proxied_file, name)
+
+
+def visible(text: str) -> str:
+    """Return ``text`` without spaces around it; "" where it has no visible character."""
+    return text.strip() if any(c.isprintable() and not c.isspace() for c in text) else ""

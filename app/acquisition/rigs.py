@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from dearig.acquisition.run_parts import RunOptions
 from dearig.config.rigfile import RigFile
 from dearig.drivers.registry import Registry
 from dearig.drivers.rig_kind import RigKind, RigOptions
 from dearig.errors import InputError
 
-__all__ = ["RIGS", "is_simulated", "kind_of", "options_of"]
+__all__ = ["RIGS", "check_address", "is_simulated", "kind_of", "options_of"]
 
 
 def _check(name: str, kind: Any) -> None:
@@ -41,6 +42,28 @@ def kind_of(address: str) -> RigKind:
         raise InputError(
             f"rig {address!r} is not known: write {', '.join(known[:-1])} or {known[-1]}"
             + (f" ({refused[0]})" if refused else "")
+        )
+    return kind
+
+
+def check_address(address: str, rig_file: RigFile, options: RunOptions) -> RigKind:
+    """Return the kind of the rig at ``address``, which is not contacted.
+
+    Raises ``InputError`` for an address that names no rig, and for a rig file and options that it
+    does not take.
+    """
+    kind = kind_of(address)
+    if options.actuator is not None and address != "sim":
+        raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
+    if kind.simulated:
+        return kind
+    if options.fault_plan.faults:
+        raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
+    if not rig_file.film.name:
+        raise InputError(
+            f"rig {address!r}: no film is declared; give a rig file whose [film] has a name, "
+            f"so that its limits are those of the film on the rig",
+            option="rig_file",
         )
     return kind
 

@@ -22,7 +22,7 @@ from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.output import LastSamples, after_run, unknown
 from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import plan
-from dearig.acquisition.rigs import is_simulated, kind_of, options_of
+from dearig.acquisition.rigs import check_address, is_simulated, options_of
 from dearig.acquisition.room import RoomOfRun, open_room
 from dearig.acquisition.run_parts import RunObserver, RunOptions, RunResult
 from dearig.clock import ClockWatch
@@ -31,7 +31,6 @@ from dearig.config.sequencefile import LoadedSequence
 from dearig.drivers.errors import AddressError, NotAtZero, RefusedWaveform, RigError
 from dearig.drivers.interlocks import Interlocks, Trip
 from dearig.drivers.rig import Block, Event, Rig
-from dearig.drivers.rig_kind import RigKind
 from dearig.drivers.row_means import RowMeans, row_channels
 from dearig.errors import (
     DearigError,
@@ -50,7 +49,7 @@ from dearig.recording.writing.disk_space import check_room
 from dearig.recording.writing.recorder import Recorder
 from dearig.recording.writing.writer import RecordingWriter
 
-__all__ = ["RunObserver", "RunOptions", "RunResult", "check_address", "open_rig", "record"]
+__all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
 
@@ -62,28 +61,6 @@ _GUARDIAN_POLL = 0.25  # s between two looks at what the operator asks
 
 
 _DEFAULT = RunOptions()
-
-
-def check_address(address: str, rig_file: RigFile, options: RunOptions) -> RigKind:
-    """Return the kind of the rig at ``address``, which is not contacted.
-
-    Raises ``InputError`` for an address that names no rig, and for a rig file and options that it
-    does not take.
-    """
-    kind = kind_of(address)
-    if options.actuator is not None and address != "sim":
-        raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
-    if kind.simulated:
-        return kind
-    if options.fault_plan.faults:
-        raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
-    if not rig_file.film.name:
-        raise InputError(
-            f"rig {address!r}: no film is declared; give a rig file whose [film] has a name, "
-            f"so that its limits are those of the film on the rig",
-            option="rig_file",
-        )
-    return kind
 
 
 def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) -> Rig:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import tomli_w
+from pydantic import ValidationError
 
 from dearig.acquisition.plan import Plan, plan
 from dearig.acquisition.prediction import peaks_of
@@ -197,9 +198,10 @@ def separating_experiment(
     )
     alike = [_and(p) for p in pairs if p not in separable]
     but = f". No excitation separates {'; '.join(alike)}" if alike else ""
+    two = "any two that can be separated" if alike else "any two"
     return found, (
         f"{chosen.name!r} ({chosen.seconds:.0f} s) separates {_and(labels)} best among "
-        f"{len(found.tried)} excitations within the rig's limits: the predictions of any two "
+        f"{len(found.tried)} excitations within the rig's limits: the predictions of {two} "
         f"differ by at least {found.separation:.2g} times the noise"
         f"{_by_channels(found, rig_file.card.average)}{but}"
     )
@@ -228,22 +230,32 @@ class _Tried:
 def _averages(electric: RigChannels, loaded: LoadedSequence, rig_file: RigFile) -> tuple[int, ...]:
     """Return the numbers of conversions in a row to be tried: what the rig does, and more.
 
-    More is tried where the rig can play ``loaded`` so.
+    More is as many as the card has time for, where the rig can play ``loaded`` so.
     """
     usual = rig_file.card.average
-    if not electric.channels or usual >= AVERAGED:
-        return (usual,)
-    try:
-        plan(loaded, averaging(rig_file, AVERAGED)).admitted()
-    except InputError:
-        return (usual,)
-    return usual, AVERAGED
+    for more in (AVERAGED, AVERAGED // 2, AVERAGED // 4, AVERAGED // 10):
+        if not electric.channels or usual >= more:
+            break
+        try:
+            plan(loaded, averaging(rig_file, more)).admitted()
+        except InputError:
+            continue
+        return usual, more
+    return (usual,)
 
 
 def averaging(rig_file: RigFile, average: int) -> RigFile:
-    """Return ``rig_file`` with ``average`` conversions in a row."""
-    card = rig_file.card.model_copy(update={"average": average})
-    return rig_file.model_copy(update={"card": card})
+    """Return ``rig_file`` with ``average`` conversions in a row.
+
+    Raises ``InputError`` where the card cannot do that.
+    """
+    tables = rig_file.model_dump()
+    tables["card"]["average"] = average
+    try:
+        return RigFile.model_validate(tables)
+    except ValidationError as error:
+        said = error.errors(include_url=False)[0]["msg"].removeprefix("Value error, ")
+        raise InputError(f"rows of {average} conversions: {said}") from error
 
 
 def _separation(
@@ -282,6 +294,8 @@ def _by_channels(found: SeparatingExperiment, usual: int) -> str:
     if not electric:
         return ""
     name, apart = max(electric, key=lambda pair: pair[1])
+    if found.average == usual and round(apart, 2) == 0.0:
+        return ""  # it shows nothing
     channel = name.replace("_", " ")
     said = f". Means of the {channel} at 200 Hz differ by {apart:.2g} times their noise"
     if found.average != usual:

@@ -17,8 +17,8 @@ from typing import Any
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.plan import plan
-from dearig.acquisition.rigs import is_simulated
-from dearig.acquisition.run import RunObserver, RunOptions, check_address, record
+from dearig.acquisition.rigs import check_address, is_simulated
+from dearig.acquisition.run import RunObserver, RunOptions, record
 from dearig.batch.after import Compute, band_violation, compute
 from dearig.batch.extremes import write_extremes
 from dearig.batch.forecast import Forecast, foresee
@@ -48,6 +48,7 @@ from dearig.errors import (
     SafetyStop,
 )
 from dearig.output_state import Known, OutputState
+from dearig.printable import visible
 from dearig.progress import Progress, quiet
 from dearig.recording.content.text import text_of
 from dearig.recording.files import write_whole
@@ -79,16 +80,6 @@ class Arming:
     hours: float | None = None
     acknowledged: str = ""
     shown: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Take texts that show nothing, such as a space, for none."""
-        for name in ("by", "acknowledged"):
-            object.__setattr__(self, name, _visible(getattr(self, name)))
-
-
-def _visible(text: str) -> str:
-    """Return ``text`` without spaces around it; "" where it has no visible character."""
-    return text.strip() if any(c.isprintable() and not c.isspace() for c in text) else ""
 
 
 def play_campaign(
@@ -125,6 +116,7 @@ def play_campaign(
     turn; ``SafetyStop``, ``InstrumentFault`` or ``NotSafe`` where a run ended so that a person must
     look; ``Interrupted`` where the operator ended it. The journal has it all.
     """
+    arming = replace(arming, by=visible(arming.by), acknowledged=visible(arming.acknowledged))
     _check_folder(folder, resume)
     if not resume:
         _check_arming(arming, address, left=False)

@@ -138,8 +138,10 @@ _use(_sources_digest())
 # several Python threads at once, as in a window with a live overlay.
 # error_model="numpy": a division by zero gives inf, which the status checks catch, no exception.
 # reassoc lets loops over branches use vector units; NaN and inf keep their meaning.
+# no_cfunc_wrapper: no kernel is called as a function of C; a twelfth of the compilation.
 _options: dict[str, Any] = {
     "nogil": True,
+    "no_cfunc_wrapper": True,
     "error_model": "numpy",
     "fastmath": {"contract", "arcp", "nsz", "reassoc"},
 }

@@ -363,18 +363,24 @@ def _sum(found: Valleys, branch: int, span: Span) -> Estimate:
     here = [branch, *found.beside(branch, _sites(found, best.x))]
     ever = {branch, *(b for sites in found.points for b in found.beside(branch, sites))}
     total = float(sum(values[_columns(layout, b)["mu", 0]] for b in here))
-    return _together(ever, total, span, f"about {values[_time(layout, branch)]:.3g}")
+    only = "" if ever == {*here} else f"; here {' and '.join(f'mu_{b}' for b in sorted(here))}"
+    return _together(ever, total, span, f"about {values[_time(layout, branch)]:.3g}", only)
 
 
-def _together(branches: Collection[int], total: float, span: Span, when: str) -> Estimate:
-    """Return the estimate of ``total`` Pa, the modulus of ``branches`` that relax at ``when``."""
+def _together(
+    branches: Collection[int], total: float, span: Span, when: str, only: str = ""
+) -> Estimate:
+    """Return the estimate of ``total`` Pa, the modulus of ``branches`` that relax at ``when``.
+
+    ``only`` says which of them do so in the reported fit, where not all do.
+    """
     return Estimate(
         " + ".join(f"mu_{b}" for b in sorted(branches)),
         "Pa",
         total,
         *span,
         is_determined(*span),
-        f"all branches that relax at {when} s together",
+        f"all branches that relax at {when} s together{only}",
     )
 
 

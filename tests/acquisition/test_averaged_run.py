@@ -13,6 +13,7 @@ from dearig.acquisition import run as run_module
 from dearig.acquisition.check import check_rig
 from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import plan
+from dearig.acquisition.rigs import kind_of, options_of
 from dearig.acquisition.run import RunObserver, RunOptions, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
@@ -70,7 +71,7 @@ def test_blocks_that_cut_rows_change_nothing(
     runs: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int
 ) -> None:
     def opened(*args: object) -> object:
-        rig = run_module.kind_of("sim").open("sim", AVERAGED, run_module.options_of(AVERAGED))
+        rig = kind_of("sim").open("sim", AVERAGED, options_of(AVERAGED))
         rig._block_samples = block
         return rig
 

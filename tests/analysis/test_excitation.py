@@ -133,3 +133,18 @@ def test_the_json_has_all_of_it() -> None:
 def test_films_are_as_they_were() -> None:
     film = film_diagnosis()
     assert with_excitation(film, SLOW) is film
+
+
+def test_a_model_that_is_not_written_is_not_kept_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, better = left("explained", 1.0, steps=(SURE,)), "are predicted better without it"
+    assert better not in " ".join(summary(found))
+    monkeypatch.setattr(type(found), "recommends_final", False)
+    assert better in " ".join(summary(found))
+
+
+def test_what_does_not_look_like_noise_is_not_called_noise() -> None:
+    found = left("explained", 1.0, steps=(SURE,))
+    assert summary(found)[0].endswith("only noise is left.")
+    unlike = tuple(replace(s, is_noise=False) for s in found.finding.after)
+    doubted = replace(found, finding=replace(found.finding, after=unlike))
+    assert summary(doubted)[0].endswith("what is left is as small as the noise.")

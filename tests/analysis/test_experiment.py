@@ -24,6 +24,7 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.interlocks import would_trip
 from dearig.drivers.settings import CardSettings
+from dearig.errors import InputError
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load
 from dearig.model.readings.channels import ChannelRecord
 from dearig.model.simulation.actuator import Actuator, Drive
@@ -96,6 +97,16 @@ def test_identical_rivals_are_left_out_of_the_score():
     alone, _ = separating_experiment(RIVALS, SLOW, NOISE)
     assert (found.name, found.separation) == (alone.name, alone.separation)
     assert "No excitation separates sensor lag and twin" in words
+    assert "any two that can be separated differ" in words
+
+
+def test_no_average_is_proposed_that_the_card_cannot_record():
+    with pytest.raises(InputError, match=r"rows of 100 conversions: .* is more than 50"):
+        averaging(SLOW, 100)
+    assert averaging(SLOW, 50).card.average == 50
+    assert averaging(SLOW, 50).film == SLOW.film
+    sequence = parse_sequence(candidates(8.0)["quick steps"], "quick steps", Path())
+    assert experiment._averages(RigChannels((CURRENT,)), sequence, SLOW) == (1, 50)
 
 
 def test_limits_lower_every_candidate():
@@ -208,7 +219,8 @@ def test_the_current_separates_what_a_poor_laser_does_not(usual, monkeypatch):
     monkeypatch.setattr(experiment, "candidates", lambda _: some)
     saturated = with_effect("amplifier saturation", loss=0.02, exponent=3.0)
     rivals = [("leakage", "leakage", LEAK), ("saturation", "amplifier", saturated)]
-    rig, noise = averaging(SLOW, usual), 100.0 * NOISE
+    quick = CardSettings(sample_rate_Hz=200.0, first_convert_us=5.0, convert_interval_us=10.0)
+    rig, noise = averaging(RigFile(card=quick), usual), 100.0 * NOISE
     alone, why = separating_experiment(rivals, rig, noise)
     assert alone is None, "the displacement alone does not separate them"
     assert "times the noise" in why

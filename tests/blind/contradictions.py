@@ -296,7 +296,7 @@ def _noise(said: Said) -> Iterator[str]:
             and s["noise_p"] > 0.05
         ):
             yield f"{name} is not noise, and every test says that it is"
-        only = any("only noise is left" in w for w in s["words"])
+        only = any("only noise is left" in w or "noise, and slow changes" in w for w in s["words"])
         if only != s["is_noise"]:
             yield f"{name}: is_noise is {s['is_noise']}, and the words say: {s['words'][0]}"
     if after["is_noise"] != all(s["is_noise"] for s in after["signature"].values()):

@@ -32,6 +32,12 @@ def test_one_effect_is_told_with_equation_parameters_and_source() -> None:
     assert bounds.split() == ["gauge", "g", "-300", "300"]
 
 
+def test_no_symbol_is_explained_that_no_equation_has() -> None:
+    answer = done("effects", "distributed hysteresis")
+    assert "z_i: strain of element i" in answer.out
+    assert "thickness of the film as it is" not in answer.out
+
+
 def test_one_effect_as_json_has_latex_and_si_units() -> None:
     answer = dearig("effects", "leakage", "--json", "-")
     (effect,) = json.loads(answer.out)["effects"]

@@ -1,6 +1,6 @@
 """Run the deep tests: ``python -m tests.deep`` all of them, ``--today`` the share of this day.
 
-The share of a day is every 56th test, so that eight weeks run all; ``--day 2026-11-28`` runs
+The share of a day is every 84th test, so that twelve weeks run all; ``--day 2026-11-28`` runs
 that of another day, ``--seed N`` so large a share drawn by a number. Other arguments go to pytest.
 """
 

@@ -9,8 +9,8 @@ __all__ = ["DAYS", "VARIABLE", "share_of"]
 
 #: The environment variable that names the share, for the processes of a distributed run.
 VARIABLE = "DEARIG_DEEP_SHARE"
-#: In so many days every deep test runs once: some 16 a day, for one to two minutes.
-DAYS = 56
+#: In so many days every deep test runs once: some 11 a day, for about one minute.
+DAYS = 84
 
 
 def share_of(names: Sequence[str], share: str) -> set[str]:
@@ -21,7 +21,7 @@ def share_of(names: Sequence[str], share: str) -> set[str]:
     names : sequence of str
         All deep tests.
     share : str
-        "" for all, ``day N`` for every 56th from the N-th on, ``seed N`` for so large a share drawn
+        "" for all, ``day N`` for every 84th from the N-th on, ``seed N`` for so large a share drawn
         by that number.
     """
     kind, _, number = share.partition(" ")

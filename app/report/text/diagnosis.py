@@ -92,7 +92,10 @@ def _as_tabled(
             f"{rms} {shown.suffix} RMS, {significant(c.errors.rms / c.noise)} times the noise "
             f"floor of {noise} {shown.suffix}"
         )
-        size += ": only noise is left" if s.is_noise else ""
+        if s.is_noise and c.errors.rms > TOLERANCE * c.noise:
+            size += ": noise, and slow changes of its own"
+        elif s.is_noise:
+            size += ": only noise is left"
         told.append(replace(s, rms=c.errors.rms, noise=c.noise, words=(size, *s.words[1:])))
     return tuple(told)
 
@@ -159,6 +162,12 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     ):  # fmt: skip
         if before and after:
             said.append(_error_change(role, before, after, outcome, bool(finding.steps)))
+    if finding.steps and not outcome.recommends_final and outcome.verdict != NOT_CONFIRMED:
+        names = [s.effect for s in finding.steps]
+        said.append(
+            f"Validation recordings are predicted better without {_them(names)}: the model to use, "
+            f"and the one that is written, is that without {_them(names)}."
+        )
     said += tested_texts(outcome)
     if outcome.few_data:
         said.append(few_data_text(outcome.few_data))
@@ -211,6 +220,7 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
             "A validation recording keeps more than its noise; the uncertainty of the fitted "
             "parameters is large enough to explain it."
         )
+        yield from undetermined_texts(outcome)
     if "selection" in reasons:
         before, after = (
             significant(selection_rms(stage, stand.train) * shown.error_factor)
@@ -285,6 +295,13 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
             f"{_film_tolerance(outcome) or ','} {tried}."
         )
     if judgement.verdict == "explained":
+        if outcome.kind != "film" and not all(s.is_noise for s in finding.after):
+            return f"{lacks}. With {_them(names)}, what is left is as small as the noise."
+        if _keeps_slow_changes(outcome):
+            return (
+                f"{lacks}. With {_them(names)}, only noise and slow changes of each recording are "
+                f"left."
+            )
         return f"{lacks}. With {_them(names)}, only noise{_film_tolerance(outcome)} is left."
     if judgement.verdict == "partly_explained":
         return (
@@ -295,6 +312,14 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
     most = listed(names)
     tried = f" {most[:1].upper()}{most[1:]} {helps}, but only a little." if names else ""
     return f"The residual is more than noise, and no known effect explains it.{tried}"
+
+
+def _keeps_slow_changes(outcome: DiagnoseOutcome) -> bool:
+    """Return whether the training recordings keep more than noise if drift is counted."""
+    train = outcome.after.train
+    if outcome.kind == "film" or not train:
+        return False
+    return pooled_rms(train) > TOLERANCE * (pooled_noise(train) or outcome.noise)
 
 
 def untried_text(outcome: DiagnoseOutcome) -> str:

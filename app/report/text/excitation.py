@@ -65,6 +65,8 @@ def tested_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
             "No validation recordings were given: the errors do not show how well the model "
             "predicts other recordings."
         )
+    if outcome.undetermined:
+        return  # what they ask and training lacks is said
     if tested is not None and verdict in (EXPLAINED, NOTHING_MISSING):
         yield (
             f"The validation recordings test this up to {significant(tested.voltage / 1e3)} kV, "

@@ -80,7 +80,7 @@ def _occurs(symbol: str, text: str) -> bool:
     upright = re.sub(r"\\(?:mathrm|operatorname)\{[^}]*\}", " ", text)
     if symbol.startswith(r"\dot"):
         return symbol in upright
-    return re.search(rf"(?<![A-Za-z\\_]){re.escape(symbol)}(?![A-Za-z_])", upright) is not None
+    return re.search(rf"(?<![A-Za-z\\_]){re.escape(symbol)}(?![A-Za-z_]|\}}_)", upright) is not None
 
 
 def parameter_meanings(effect: Effect) -> tuple[tuple[str, str, str, str], ...]:

@@ -25,7 +25,14 @@ EFFECT = Effect(
         source="C. Rapp, Proc. 2nd European Conf. Satellite Communications, 179 (1991)",
     ),
     parameters=(
-        Parameter("loss", "", (0.0, 0.5), "relative loss of voltage at 8 kV", 0.02, 0.0),
+        Parameter(
+            "loss",
+            "",
+            (0.0, 0.5),
+            "relative loss of voltage at 8 kV while it is small: (1 + n s)^(-1/n) is left",
+            0.02,
+            0.0,
+        ),
         Parameter(
             "exponent",
             "",

@@ -45,7 +45,7 @@ EFFECT = Effect(
             "reach",
             "",
             (1e-3, 2.0),
-            "change of stretch at which the last element slips",
+            "upper end of the thresholds, as a change of stretch",
             2e-2,
             starts=(2e-2, 5e-3, 0.5),
             logarithmic=True,
