@@ -230,11 +230,13 @@ class _Tried:
 def _averages(electric: RigChannels, loaded: LoadedSequence, rig_file: RigFile) -> tuple[int, ...]:
     """Return the numbers of conversions in a row to be tried: what the rig does, and more.
 
-    More is as many as the card has time for, where the rig can play ``loaded`` so.
+    More is the largest of a few numbers for which the card has time, and with which the rig can
+    play ``loaded``. None is tried where no channel gains by it.
     """
     usual = rig_file.card.average
-    for more in (AVERAGED, AVERAGED // 2, AVERAGED // 4, AVERAGED // 10):
-        if not electric.channels or usual >= more:
+    for part in (1, 2, 4, 10) if electric.channels else ():
+        more = AVERAGED // part
+        if usual >= more:
             break
         try:
             plan(loaded, averaging(rig_file, more)).admitted()

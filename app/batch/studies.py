@@ -84,13 +84,12 @@ def subjects_of(sources: Sequence[Path], out: Path) -> list[Subject]:
     if len(found) > _MOST:
         raise InputError(f"{len(found):,} recordings are more than {_MOST:,}; study them in parts")
     names: set[str] = set()
+    files: dict[str, str] = {}
     for subject in found:
         if subject.name in names:
             raise InputError(f"{subject.name} is given twice; give each recording once")
         names.add(subject.name)
-    named: dict[str, str] = {}
-    for subject in found:
-        other = named.setdefault(os.path.realpath(subject.path), subject.name)
+        other = files.setdefault(os.path.realpath(subject.path), subject.name)
         if other != subject.name:
             raise InputError(f"{subject.name} and {other} are one file; give each recording once")
     return found

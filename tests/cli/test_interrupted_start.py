@@ -1,4 +1,4 @@
-"""Ctrl-C while a command is loaded: one sentence, exit code 130, and no run, whoever drops it."""
+"""Ctrl-C while a command is loaded: one sentence, exit code 130, and no run."""
 
 import subprocess
 import sys
@@ -15,45 +15,34 @@ def press():
     for _ in range(100):
         pass
 """
-#: Where the press comes, and what becomes of its exception.
+#: The module at whose import ctrl-C is pressed, and what becomes of the exception.
 _CASES = {
-    "raised by an import of the command": """
-class Finder:
-    def find_spec(self, name, path=None, target=None):
-        if name == "typer":
-            press()
-
-sys.meta_path.insert(0, Finder())
-""",
-    "dropped by compiled code": """
-class Finder:
-    def find_spec(self, name, path=None, target=None):
-        if name == "numpy.random._generator":
-            try:
-                press()
-            except KeyboardInterrupt:
-                pass
-
-sys.meta_path.insert(0, Finder())
-""",
-    "wrapped into an error of a library": """
-class Finder:
-    def find_spec(self, name, path=None, target=None):
-        if name == "dearig.config.sequencefile":
-            try:
-                press()
-            except KeyboardInterrupt:
-                raise ImportError("its other half failed to import")
-
-sys.meta_path.insert(0, Finder())
-""",
+    "raised by an import of the command": ("typer", "raise"),
+    "dropped by compiled code": ("numpy.random._generator", "pass"),
+    "wrapped into an error of a library": (
+        "dearig.config.sequencefile",
+        "raise ImportError('its other half failed to import')",
+    ),
 }
+_FINDER = """
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            try:
+                press()
+            except KeyboardInterrupt:
+                {answer}
+
+sys.meta_path.insert(0, Finder())
+"""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signal to oneself")
 @pytest.mark.parametrize("case", list(_CASES))
 def test_ctrl_c_while_the_command_is_loaded_starts_nothing(case: str, tmp_path: Path) -> None:
-    code = f"{_PRESS}{_CASES[case]}\nfrom dearig.__main__ import main\nmain()"
+    module, answer = _CASES[case]
+    finder = _FINDER.format(module=module, answer=answer)
+    code = f"{_PRESS}{finder}\nfrom dearig.__main__ import main\nmain()"
     done = subprocess.run(
         [sys.executable, "-P", "-c", code, "record", "thesis", "--out", "run.h5"],
         cwd=tmp_path, capture_output=True, text=True, check=False,

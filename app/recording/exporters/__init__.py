@@ -55,13 +55,13 @@ def export_recording(
         raise InputError(f"a recording is exported to {', '.join(EXPORTS)}, not to {to!r}")
     exporter = EXPORTS[to]
     out = check_output(path.with_suffix(f".{to}") if out is None else out, overwrite, path)
-    beside = None if exporter.describes else check_output(description_path(out), overwrite, path)
+    described = None if exporter.describes else check_output(description_path(out), overwrite, path)
     recording = open_recording(path)
     with replaced_when_done(out, overwrite) as partial:
         exporter.write(recording, partial)
-        if beside is not None:
+        if described is not None:
             digest = file_sha256(partial)
-            with replaced_when_done(beside, overwrite) as description:
+            with replaced_when_done(described, overwrite) as description:
                 write_description(
                     description, out.name, digest, units_of(recording), description_of(recording)
                 )

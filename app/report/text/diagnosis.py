@@ -92,7 +92,8 @@ def _as_tabled(
             f"{rms} {shown.suffix} RMS, {significant(c.errors.rms / c.noise)} times the noise "
             f"floor of {noise} {shown.suffix}"
         )
-        if s.is_noise and c.errors.rms > TOLERANCE * c.noise:
+        # the noise of a film's signature has the error that its model is allowed
+        if s.is_noise and c.errors.rms > TOLERANCE * max(c.noise, s.noise):
             size += ": noise, and slow changes of its own"
         elif s.is_noise:
             size += ": only noise is left"

@@ -65,9 +65,9 @@ def tested_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
             "No validation recordings were given: the errors do not show how well the model "
             "predicts other recordings."
         )
-    if outcome.undetermined:
-        return  # what they ask and training lacks is said
-    if tested is not None and verdict in (EXPLAINED, NOTHING_MISSING):
+    # where training lacks what they ask, that is said instead
+    confirmed = verdict in (EXPLAINED, NOTHING_MISSING) and not outcome.undetermined
+    if tested is not None and confirmed:
         yield (
             f"The validation recordings test this up to {significant(tested.voltage / 1e3)} kV, "
             f"edges of {significant(tested.rate / 1e3)} kV/s and motion at "
