@@ -24,7 +24,7 @@ from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
 from dearig.analysis.loops import cycle_edges
 from dearig.analysis.validate import validate_model
-from dearig.batch.numbers import errors_of, parameters_of, peaks_of
+from dearig.batch.numbers import errors_of, parameters_of, peaks_of, rejection_of
 from dearig.config.modelfile import load_model
 from dearig.config.parameterfile import Stated
 from dearig.errors import InputError
@@ -223,7 +223,8 @@ def _computed(recording: Recording, options: StudyOptions, progress: Progress) -
             model.write_text(options.model, "utf-8", newline="\n")
             loaded = load_model(model)
         validated = validate_model(loaded, [recording], drive=options.drive, progress=progress)
-        return errors_of(validated.comparisons[0])
+        only = validated.comparisons[0]
+        return errors_of(only) | rejection_of(only)
     if options.do == "identify":
         fitted = identify_recordings(
             [recording], branches=(options.branches,), spring=options.spring, drive=options.drive,
@@ -235,6 +236,7 @@ def _computed(recording: Recording, options: StudyOptions, progress: Progress) -
         return {
             **parameter_columns(parameters_of(fitted)),
             **errors_of(fitted.train[0]),
+            **rejection_of(fitted.train[0]),
             "converged": bool(fitted.fit.converged),
         }
     found = diagnose_recordings(
@@ -249,6 +251,7 @@ def _computed(recording: Recording, options: StudyOptions, progress: Progress) -
         "effects": ", ".join(step.effect for step in found.finding.steps),
         **parameter_columns(parameters_of(found)),
         **errors_of(found.after.train[0]),
+        **rejection_of(found.after.train[0]),
         **{f"{name}_before": value for name, value in errors_of(found.before.train[0]).items()},
     }
 

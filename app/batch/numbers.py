@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
+from dearig.model.verdict import is_rejected
 from dearig.recording.json_file import finite
 from dearig.recording.reading.recording import Recording
 from dearig.units import SHOWN, parameter_key, parameter_unit
@@ -20,6 +21,7 @@ __all__ = [
     "parameter_of",
     "parameters_of",
     "peaks_of",
+    "rejection_of",
 ]
 
 
@@ -62,6 +64,12 @@ def errors_of(comparison: Comparison) -> dict[str, float]:
         f"max_{shown.suffix}": errors.max * shown.error_factor,
     }
     return {name: float(value) for name, value in found.items() if math.isfinite(value)}
+
+
+def rejection_of(comparison: Comparison) -> dict[str, Any]:
+    """Return the probability that noise as that at rest leaves the residual, and what follows."""
+    p = comparison.misfit_p
+    return {"misfit_p": finite(p), "rejected": None if p is None else is_rejected(p)}
 
 
 def peaks_of(recording: Recording) -> dict[str, float | None]:

@@ -16,7 +16,7 @@ from dearig.batch.fits import (
     about,
     parameter_columns,
 )
-from dearig.batch.numbers import errors_of, parameter_of
+from dearig.batch.numbers import errors_of, parameter_of, rejection_of
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import one_line
@@ -93,6 +93,7 @@ def _fit(
             "fitted_together": len(fitted),
             **parameter_columns([parameter_of(estimate) for estimate in outcome.estimates]),
             **errors_of(outcome.comparison),
+            **rejection_of(outcome.comparison),
             "converged": outcome.converged,
         }
 

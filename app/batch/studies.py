@@ -98,7 +98,9 @@ def subjects_of(sources: Sequence[Path], out: Path) -> list[Subject]:
 def _in_folder(folder: Path, before: str, out: Path) -> Iterator[Subject]:
     inside = out.resolve()
     runs: dict[str, dict[Path, Any]] = {}
-    for name in sorted(list_folder(folder).files):
+    listing = list_folder(folder)
+    # what cannot be read has a row that says so
+    for name in sorted([*listing.files, *(entry.path for entry in listing.unread)]):
         path = folder / name
         if path.resolve().is_relative_to(inside):
             continue

@@ -323,6 +323,7 @@ _REWORDED = (
     (r"it must be a valid number, unable .*", "it must be a number"),
     (r"it must be greater than or equal to ", "it must be at least "),
     (r"it must be less than or equal to ", "it must be at most "),
+    (r"No such option: -\d.*", "a value below 0 stands after two dashes, as in -- -0.5"),
     (r"Got unexpected extra argument\(?s?\)? \((.*)\)", r"too many arguments, from \1 on"),
 )
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dearig.model.diagnosis.channels import ChannelSays
 from dearig.model.diagnosis.engine import Race, SearchResult
-from dearig.model.diagnosis.evidence import Judge, family_of
+from dearig.model.diagnosis.evidence import family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter, fit_of, gain_that_ends
 from dearig.model.diagnosis.imposed import lateness
 from dearig.model.diagnosis.results import (
@@ -249,7 +249,10 @@ class Conclusion:
             effect = EFFECTS[name]
             alike = self.alike(member)
             rivals += [(family_of(other), fit.model) for other, fit in alike]
-            without = self.with_only(best.members - {member})
+            others = best.members - {member}
+            # other models keep the springs of a fit with drift; its evidence is of a fit without
+            unknown = member == DRIFT and others not in self.found.fits
+            without = self._without(best, member) if unknown else self.with_only(others)
             with_it = self.with_only(frozenset(order[: i + 1]))
             worth = self.judge.gain(without, best)
             own = tuple(
@@ -335,7 +338,7 @@ def conclude(
     return Diagnosis(
         verdict=verdict,
         baseline=first,
-        rounds=tuple(_round(race, judge, fitter) for race in found.races),
+        rounds=tuple(_round(race, found, fitter) for race in found.races),
         steps=tuple(steps),
         final=final,
         before=before,
@@ -477,8 +480,9 @@ def _own_delays(end: Conclusion) -> list[str]:
     return said
 
 
-def _round(race: Race, judge: Judge, fitter: Fitter) -> Round:
+def _round(race: Race, found: SearchResult, fitter: Fitter) -> Round:
     """Return a race as a round of the report: candidates with one more effect, best first."""
+    judge = found.judge
     parent, candidates = race.parent, []
     single = [f for f in race.fits if len(f.members - parent.members) == 1]
     best = judge.ranked(race.fits)[0] if race.fits else parent
@@ -508,8 +512,22 @@ def _round(race: Race, judge: Judge, fitter: Fitter) -> Round:
         )
     added = sorted(race.taken.members - parent.members) if race.taken is not None else []
     chosen = added[0] if len(added) == 1 else None
-    explain = "explains" if len(added) == 1 else "explain"
-    reason = "no effect is worth its parameters"
     if added:
-        reason = f"{' and '.join(added)} {explain} most"
+        reason = f"{' and '.join(added)} {'explains' if len(added) == 1 else 'explain'} most"
+    else:
+        reason = _why_none(race, found)
     return Round(parent.effects, tuple(candidates), chosen, reason)
+
+
+def _why_none(race: Race, found: SearchResult) -> str:
+    """Return why a race has added nothing."""
+    judge, parent = found.judge, race.parent
+    worth = [f for f in race.fits if judge.gain(parent, f) > judge.settings.odds]
+    if not worth:
+        return "no effect is worth its parameters"
+    leading = judge.ranked(worth)[0]
+    kept = sorted(_label(m, found.best) for m in found.best.members - parent.members)
+    if kept and judge.gain(leading, found.best) > 0.0:
+        return f"{' and '.join(kept)} {'is' if len(kept) == 1 else 'are'} more probable"
+    names = " and ".join(sorted(leading.members - parent.members))
+    return f"{names} would explain too little of what is left to be named"

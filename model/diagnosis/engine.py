@@ -313,13 +313,14 @@ class Search:
         return best
 
     def without(self, fit: Fit, name: str) -> Fit:
-        """Return ``fit`` refitted without one of its effects; once for each set of effects."""
+        """Return ``fit`` refitted without a member; once for each set of members."""
         left = fit.members - {name}
         if (fit.members, name) in self._left_out:
             return self.fits[left]
         known = dict(zip(fit.problem.layout.names, fit.x, strict=True))
         effects = tuple(e for e in fit.model.effects if e[0] != name)
-        problem = self.fitter.problem(replace(fit.model, effects=effects), fit.drift)
+        drift = 0.0 if name == DRIFT else fit.drift
+        problem = self.fitter.problem(replace(fit.model, effects=effects), drift)
         x = np.array([known[n] for n in problem.layout.names])
         found = self.keep(self.fitter.refined(self.fitter.descend(problem, x, 20)))
         self._left_out.add((fit.members, name))  # not before: the fit may end the search

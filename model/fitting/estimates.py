@@ -49,6 +49,7 @@ BY_CURVATURE = "from the curvature at the optimum: the profile was not followed 
 MOVES_MAX = 3
 
 _END_STATED = "the interval ends at a stated bound"
+_END_OF_LAW = "the interval ends where the range of its law does"
 _FIXED = "fixed"
 _J_WORDS = "no spring stiffens measurably at these stretches: only a lower bound"
 _AT_END = 1e-9  # of a coordinate: a descent clips to the bound itself
@@ -229,12 +230,21 @@ def _estimate(
         note = end_text(q, value)
     elif not followed:
         note = f"{note}; {BY_CURVATURE}" if note else BY_CURVATURE
-    stated = q.constraint
-    if stated is not None and not at_end and (low == stated.low or high == stated.high):
-        note = f"{note}; {_END_STATED}" if note else _END_STATED
+    if not at_end and (why := _cut(q, low, high)):
+        note = f"{note}; {why}" if note else why
     return Estimate(
-        q.name, q.unit, value, low, high, determined, note, at_bound=at_end, constraint=stated
+        q.name, q.unit, value, low, high, determined, note, at_bound=at_end, constraint=q.constraint
     )
+
+
+def _cut(q: FreeParameter, low: float, high: float) -> str:
+    """Return which bound cuts an interval off, before the data end it; "" where none does."""
+    stated = q.constraint
+    if stated is not None and (low == stated.low or high == stated.high):
+        return _END_STATED
+    lowest, highest = q.open_ends
+    # an interval that begins at 0 is that of something which may be absent, and its note says so
+    return _END_OF_LAW if low == lowest != 0.0 or high == highest < math.inf else ""
 
 
 def fixed_estimate(q: FreeParameter) -> Estimate:

@@ -20,6 +20,7 @@ from dearig.batch.extremes import write_extremes
 from dearig.batch.fits import StudyOptions, about, fit_task, key_of
 from dearig.batch.studies import study_recordings, subjects_of, with_model
 from dearig.errors import InputError
+from dearig.model.verdict import REJECTED_BELOW
 from dearig.recording import RunMetadata
 from dearig.recording.reading.reader import open_recording
 from dearig.recording.writing.save import save_recording
@@ -68,6 +69,13 @@ def test_a_broken_recording_costs_its_row_and_nothing_is_computed_twice(
         subjects = subjects_of([shelf / "recordings"], tmp_path)
         return study_recordings(subjects, options, tmp_path, LocalEngine(1, counted))
 
+    (shelf / "recordings" / "moved.h5").symlink_to(shelf / "away.h5")
+    with_lost = table()
+    (shelf / "recordings" / "moved.h5").unlink()
+    (lost,) = (row for row in with_lost.rows if row["recording"] == "moved.h5")
+    assert (lost["state"], lost["reason"]) == ("failed", "moved.h5 is not there")
+    computed.clear()
+    shutil.rmtree(tmp_path / "cache")
     first = table()
     assert [(row["recording"], row["state"]) for row in first.rows] == [
         ("broken.h5", "failed"), (SECOND, "ok"), (FIRST, "ok")
@@ -80,6 +88,10 @@ def test_a_broken_recording_costs_its_row_and_nothing_is_computed_twice(
     assert sorted(computed) == sorted(["broken.h5", "broken.h5", FIRST, SECOND])
     # a number in the table is the number to its last digit
     found = {row["recording"]: row for row in rows(again.table)}
+    assert found["broken.h5"]["rejected"] == ""
+    for name in (FIRST, SECOND):
+        likely = float(found[name]["misfit_p"])
+        assert found[name]["rejected"] == str(likely < REJECTED_BELOW)
     assert [float(found[r["recording"]]["rms_um"]) for r in first.rows[1:]] == [
         r["rms_um"] for r in first.rows[1:]
     ]

@@ -157,7 +157,8 @@ class Listing:
 
     ``files`` has size in bytes and time of the last change in ns by relative path; ``entries`` the
     entries of those that have not changed since they were read; ``unread`` an entry for each
-    subfolder that cannot be read, whose path ends in ``/``; ``folders`` the subfolders.
+    subfolder that cannot be read, whose path ends in ``/``, and for each link to no file;
+    ``folders`` the subfolders.
     """
 
     folder: Path
@@ -198,7 +199,7 @@ def keep_index(listing: Listing, entries: Mapping[str, Entry], cache: Path | Non
 
 
 def _files(folder: Path, deep: bool) -> tuple[list[tuple[str, int, int]], list[Entry], list[str]]:
-    """Return the files that may be recordings, an entry for each folder that cannot be read.
+    """Return the files that may be recordings, and an entry for each folder or link without one.
 
     Each file has its relative path, its size, and the time of its last change in ns. The third
     value are the relative paths of the subfolders.
@@ -218,9 +219,14 @@ def _files(folder: Path, deep: bool) -> tuple[list[tuple[str, int, int]], list[E
                         if deep:
                             waiting.append(f"{name}/")
                             folders.append(name)
-                    elif name.lower().endswith(ENDINGS) and item.is_file():
+                    elif not name.lower().endswith(ENDINGS):
+                        continue
+                    elif item.is_file():
                         about = item.stat()
                         found.append((name, about.st_size, about.st_mtime_ns))
+                    elif item.is_symlink() and not item.is_dir():
+                        lost = f"{folder / name} is a link to a file that is not there"
+                        unread.append(Entry(name, 0, trouble=lost, passing=True))
         except OSError as error:
             reason = f"{folder / here} cannot be read: {in_words(error)}"
             if not here:

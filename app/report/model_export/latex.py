@@ -166,10 +166,16 @@ def _row(symbol: str, value: float, unit: str, interval: tuple[Any, Any] | None)
         return rf"${symbol}$ & {_math(significant(value, 6))} & {unit} & \\"
     if interval[0] == _FIXED:
         return rf"${symbol}$ & {_math(significant(value, 6))} & {unit} & {_FIXED} \\"
-    low = -math.inf if interval[0] is None else float(interval[0])
-    high = math.inf if interval[1] is None else float(interval[1])
+    open_low, open_high = (end is None for end in interval)
+    # an end that the data leave open is 0 or infinite, and the history has neither
+    low = 0.0 if open_low else float(interval[0])
+    high = math.inf if open_high else float(interval[1])
     shown = _math(quoted(value, low, high))
-    ends = f"[{', '.join(map(_math, interval_ends(low, high)))}]"
+    if open_low or open_high:
+        near = "" if open_low and open_high else _math(significant(low if open_high else high, 2))
+        ends = f"{'above' if open_high else 'below'} {near}" if near else "open"
+    else:
+        ends = f"[{', '.join(map(_math, interval_ends(low, high)))}]"
     return rf"${symbol}$ & {shown} & {unit} & {ends} \\"
 
 

@@ -46,6 +46,7 @@ _NAMES_MAX = 6  # more recordings than this are counted and not named
 _LIKELY = 0.05  # a strain energy that is less probable is not named
 # RMS over noise floor up to which the residual is almost only noise, and beyond which it is more
 _AT_NOISE, _ABOVE_NOISE = 1.1, 1.5
+_RARE = 0.05  # a probability below it is not quoted as agreement
 
 
 def spring_label(kind: str) -> str:
@@ -285,6 +286,11 @@ def _error(comparisons: Sequence[Comparison]) -> str:
         )
     if ratio <= _AT_NOISE:
         return f"{words} The noise floor is {floor}: the residual is almost only noise."
+    if p is not None and p < _RARE:
+        return (
+            f"{times}, which noise as that at rest seldom leaves ({p_text(p)}): too often to "
+            f"reject the model, too seldom to trust it."
+        )
     if p is not None:
         return f"{times}, which noise as that at rest does not exclude ({p_text(p)})."
     if ratio > _ABOVE_NOISE:

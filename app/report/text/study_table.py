@@ -20,6 +20,7 @@ _COLUMNS = (
     "mu_0_kPa",
     "rms_um",
     "rms_kPa",
+    "rejected",
     *CONDITIONS,
 )
 
@@ -72,6 +73,8 @@ def _shown(row: Mapping[str, Any], name: str) -> str:
     value = row.get(name)
     if value is None or value == "":
         return NO_VALUE
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if not isinstance(value, float):
         return str(value)
     low, high = row.get(f"{name}_low95"), row.get(f"{name}_high95")

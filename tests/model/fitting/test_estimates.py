@@ -12,6 +12,7 @@ from dearig.model.fitting import add_intervals, identify
 from dearig.model.fitting.estimates import (
     BY_CURVATURE,
     BetterPoint,
+    _estimate,
     estimates_with_intervals,
     recentre,
 )
@@ -145,3 +146,21 @@ def test_intervals_take_the_model_to_its_optimum(changed: str) -> None:
         if before.determined:
             assert e.low < e.value < e.high
             assert before.low < e.value < before.high
+
+
+def test_an_interval_that_the_range_of_a_law_cuts_off_says_so() -> None:
+    slow = effect("dielectric relaxation", strength=0.1, relaxation_time=0.2, settled=0.0)
+    layout = FitLayout(replace(PLAIN, effects=slow))
+    by_name = dict(zip(layout.names, layout.quantities, strict=True))
+    late = by_name["dielectric relaxation: relaxation_time"]
+    low, high = late.search_range
+    assert low > 0.0
+    inside = math.sqrt(low * high)
+    for span in ((low, inside), (inside, high)):
+        cut = _estimate(late, inside, span, held=False, at_end=False, followed=True)
+        assert cut.note.endswith("the interval ends where the range of its law does")
+    whole = _estimate(late, inside, (0.9 * inside, 1.1 * inside), False, False, followed=True)
+    assert (whole.note, whole.determined) == ("", True)
+    # of a spring an open end is 0 or infinite, which its note says
+    spring = _estimate(by_name["mu_1"], 4e4, (0.0, 5e4), False, False, followed=True)
+    assert spring.note == "only an upper bound"

@@ -111,6 +111,10 @@ def test_folders_that_cannot_be_looked_at(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"file is not a folder"):
         index_folder(tmp_path / "file", cache=tmp_path / "c.json")
     assert lines(index_folder(tmp_path, cache=tmp_path / "c.json")) == ["no recordings"]
+    (tmp_path / "moved.h5").symlink_to(tmp_path / "away.h5")
+    (lost,) = index_folder(tmp_path, cache=tmp_path / "c.json")
+    assert lost.path == "moved.h5"
+    assert lost.trouble.endswith("moved.h5 is a link to a file that is not there")
 
 
 def test_the_command(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

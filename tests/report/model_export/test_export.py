@@ -140,6 +140,9 @@ def test_the_page_has_the_equations_with_numbers_and_intervals() -> None:
         {"name": "mu_0", "low95": 45e3, "high95": 46.5e3},
         {"name": "strained electrode: gauge", "low95": 13.5, "high95": 13.7},
         {"name": "T_2", "stated": {"fixed": 0.3980}},
+        {"name": "mu_1", "low95": None, "high95": 2e5},
+        {"name": "J_0", "low95": 21.0, "high95": None},
+        {"name": "J_1", "low95": None, "high95": None},
     ]}  # fmt: skip
     page = export_text(ModelFile("film_7 & more", model, history), "latex")
     for equation in EFFECTS["strained electrode"].law.equations:
@@ -150,6 +153,12 @@ def test_the_page_has_the_equations_with_numbers_and_intervals() -> None:
     assert "[$13.500$, $13.700$]" in gauge
     (fixed,) = (line for line in page.splitlines() if line.startswith("$T_{2}$"))
     assert fixed.endswith(r"& fixed \\")
+    # an end of an interval that the data leave open is no number
+    ends = (r"$\mu_{1}$", r"below $200000$"), (r"$J_{0}$", r"above $21$"), (r"$J_{1}$", "open")
+    for symbol, end in ends:
+        (row,) = (line for line in page.splitlines() if line.startswith(symbol))
+        assert row.endswith(rf"& {end} \\")
+    assert r"\infty" not in page
     for opened in re.findall(r"\\begin\{(\w+\*?)\}", page):
         assert page.count(f"\\begin{{{opened}}}") == page.count(f"\\end{{{opened}}}")
 
