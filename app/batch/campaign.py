@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dearig.acquisition.check import check_rig
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.plan import plan
 from dearig.acquisition.rigs import check_address, is_simulated
@@ -120,7 +121,9 @@ def play_campaign(
     _check_folder(folder, resume)
     if not resume:
         _check_arming(arming, address, left=False)
-    check_address(address, rig_file, options)
+    if not check_address(address, rig_file, options).simulated:
+        # each run is refused for it too, but then there is a journal that cannot be played
+        check_rig(address, rig_file).refuse_without_watchdog()
 
     def planning(stage: str, part: float) -> None:
         if interrupts is not None and interrupts.asked():

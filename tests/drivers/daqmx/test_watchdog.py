@@ -10,7 +10,7 @@ from dearig.drivers.daqmx.watchdog import WATCHDOG, watchdog_text
 from dearig.errors import InputError
 from dearig.sim_backend.daqmx.properties import attributes
 from tests.deep import mostly_deep
-from tests.tools.command import LOBE, dearig, done, refused, write
+from tests.tools.command import LOBE, dearig, done, names, refused, write
 from tests.tools.daqmx import served
 
 IS_SIMULATED = ("Device", 0x22CA)
@@ -47,6 +47,23 @@ def test_a_real_card_without_watchdog_and_declaration_is_refused_untouched(tmp_p
     sentence = refused(answer, NO_WATCHDOG, "card.do_hv_enable", "i_have_no_watchdog = true")
     assert "Dev1" in sentence
     assert not out.exists()
+
+
+@pytest.mark.usefixtures("real")
+def test_a_campaign_on_such_a_card_is_refused_before_its_folder_is_made(tmp_path):
+    rig = write(tmp_path / "rig.toml", '[film]\nname = "A7"\n')
+    write(tmp_path / "lobe.toml", LOBE)
+    plan = write(tmp_path / "plan.toml", 'name = "one"\nsequence = "lobe.toml"\n')
+    before = names(tmp_path)
+    with served() as card:
+        answer = dearig(
+            "campaign", plan, "--rig", f"daqmx:Dev1@127.0.0.1:{card.server.port}", "--rig-file",
+            rig, "--out", tmp_path / "out", "--operator", "Ada", "--runs", 1, "--hours", 1,
+        )  # fmt: skip
+        assert len(card.device.history()) == 1
+    assert answer.code == 2
+    assert NO_WATCHDOG in answer.err
+    assert names(tmp_path) == before
 
 
 @pytest.mark.usefixtures("real")
