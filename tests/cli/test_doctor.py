@@ -88,6 +88,7 @@ def test_the_kernel_cache_is_named() -> None:
     assert str(cache_folder()) in items("kernels")["compiled kernels"]["found"]
 
 
+@pytest.mark.deep
 def test_a_plug_in_that_fails_is_told_with_the_reason(tmp_path: Path) -> None:
     """Of another distribution, as pip would have installed it; seen by a process of its own."""
     about = tmp_path / "other-1.2.dist-info"

@@ -52,6 +52,7 @@ def titled(path: Path, text: str) -> Path:
     return path
 
 
+@pytest.mark.deep
 @examples(15, suite=5)
 @given(text=FILE_TEXTS)
 def test_texts_of_a_recording(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:

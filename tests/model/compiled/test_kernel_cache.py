@@ -128,6 +128,7 @@ def test_a_planted_file_in_a_folder_that_was_open_once_is_not_run(tmp_path: Path
     assert index.name in note
 
 
+@pytest.mark.deep
 def test_numbas_own_choice_of_folders_is_not_followed(tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     run(tmp_path, NUMBA_CACHE_DIR=str(cache), NUMBA_CACHE_LOCATOR_CLASSES="InTreeCacheLocator")
@@ -151,6 +152,7 @@ def test_a_damaged_cache_is_compiled_again(tmp_path: Path, damage: bytes) -> Non
     run(tmp_path, NUMBA_CACHE_DIR=str(cache))
 
 
+@pytest.mark.deep
 @pytest.mark.skipif(sys.platform != "linux", reason="a limit to the size of files is Linux's")
 def test_a_full_disk_costs_time_and_no_result(tmp_path: Path) -> None:
     cache = tmp_path / "cache"

@@ -33,7 +33,7 @@ from dearig.model.film.material import THESIS_FILM
 from dearig.model.simulation.actuator import Drive, at_rest, initial_state
 from dearig.model.simulation.strip import Strip
 from dearig.sim_backend.model_plant import ModelPlant
-from tests.deep import one_of_each
+from tests.deep import mostly_deep, one_of_each
 from tests.tools.effect_cases import (
     BOTH,
     BY_STRETCH,
@@ -461,7 +461,7 @@ def steps_of(name, p, time, stretch):
     return np.array(out)
 
 
-@pytest.mark.parametrize("size", [1.0, 20.0])
+@pytest.mark.parametrize("size", mostly_deep([1.0, 20.0], [20.0]))
 @pytest.mark.parametrize(
     "name",
     [
@@ -634,7 +634,7 @@ print(assembly.stress(assembly.active(c), c, np.zeros(500), 1.1, 0.0, 1.1, 0.0, 
 """
 
 
-@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("compiled", mostly_deep([False, True], [False]))
 def test_an_effect_is_one_file(compiled, tmp_path):
     package = Path(assembly.__file__).parents[1]
     (tmp_path / "dearig").mkdir()

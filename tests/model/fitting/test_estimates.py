@@ -67,6 +67,7 @@ def test_means_of_readings_have_the_optimum_of_all_readings(lead_in: int) -> Non
     assert np.abs(gradient / scale).max() < 0.1
 
 
+@pytest.mark.deep
 def test_no_interval_is_narrower_than_with_all_others_known() -> None:
     """Two branches that the data do not tell apart lead the path of the others astray."""
     first, *rest = PLAIN.network.branches

@@ -7,10 +7,11 @@ from dearig.model.kernel.motion import spring_table
 from dearig.model.kernel.rk4 import rk4_steps
 from dearig.model.kernel.rodas import rodas_step
 from dearig.model.simulation.actuator import initial_state
+from tests.deep import mostly_deep
 from tests.tools.film_drives import THESIS
 
 
-@pytest.mark.parametrize("method", ["rk4", "rodas"])
+@pytest.mark.parametrize("method", mostly_deep(["rk4", "rodas"], ["rodas"]))
 def test_a_method_of_order_four_converges_with_the_fourth_power_of_the_step(method):
     c = THESIS.coefficients()
     springs = spring_table(c)

@@ -178,6 +178,7 @@ def test_damaged_files_are_a_sentence(tmp_path: Path, name: str) -> None:
     assert refused > 5 or name == "sidecars"
 
 
+@pytest.mark.deep
 def test_damaged_recordings_are_a_sentence_and_no_crash(tmp_path: Path) -> None:
     assert fuzz("recordings", 1, 60, float("inf"), tmp_path) == (60, 0)
     assert {path.name for path in tmp_path.iterdir()} == {"current.h5", "errors.txt"}

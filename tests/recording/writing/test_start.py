@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from dearig.recording import open_recording
 from tests.tools.recordings import run_counts, write_run
@@ -26,6 +27,7 @@ main()
 """
 
 
+@pytest.mark.deep
 def test_info_export_and_import_work_without_scipy_and_pyarrow(tmp_path: Path) -> None:
     run = tmp_path / "run.h5"
     write_run(run, run_counts(300, quiet=100))
