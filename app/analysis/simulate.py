@@ -59,15 +59,26 @@ class SimulatedRecord:
 
     @property
     def open_limits(self) -> tuple[str, ...]:
-        """Locking limits that the fit of the model did not determine, by their names."""
+        """Locking limits that the fit of the model did not determine, by their names.
+
+        All of them where no intervals were computed.
+        """
         estimates = self.model.history.get("estimate")
         tables = estimates if isinstance(estimates, list) else []
+        if self.is_without_intervals:
+            springs = enumerate(self.model.model.network.springs)
+            return tuple(f"J_{i}" for i, s in springs if s.kind == "gent")
         return tuple(
             str(e["name"])
             for e in tables
             if isinstance(e, dict) and e.get("determined") is False
             and str(e.get("name", "")).startswith("J_")
         )  # fmt: skip
+
+    @property
+    def is_without_intervals(self) -> bool:
+        """Whether the model was fitted, and no interval of its parameters was computed."""
+        return self.model.history.get("estimate") == [] and "method" in self.model.history
 
     @property
     def columns(self) -> dict[str, np.ndarray]:

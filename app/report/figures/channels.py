@@ -113,7 +113,7 @@ def evidence_figure(
         ax.set_yticks(rows, names)
         ax.set_ylim(len(evidence) - 0.5, -0.5)
         ax.grid(visible=False, axis="y")
-        ax.set_xlabel("Gain of the criterion over the plain model")
+        ax.set_xlabel("Gain of the criterion\nover the plain model")
         base.legend(ax, 3)
     return figure
 

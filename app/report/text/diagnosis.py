@@ -421,6 +421,30 @@ def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
                 f"{significant(c.rms_without_events * shown.error_factor)} {shown.error_unit} RMS."
             )
         yield f"In {c.name} there is {what}: other recordings are predicted without it.{left}"
+    yield from _events_of_each_run((*outcome.after.train, *outcome.after.validation))
+
+
+_SAME_MOMENT = 0.02  # s: times of events are told to a hundredth
+
+
+def _events_of_each_run(comparisons: Sequence[Comparison]) -> Iterator[str]:
+    """Yield a sentence on each event that several recordings have at the same moment."""
+    found = sorted((e.kind, e.time, c.name) for c in comparisons for e in c.events)
+    groups: list[list[tuple[str, float, str]]] = []
+    for event in found:
+        last = groups[-1][-1] if groups else ("", 0.0, "")
+        if event[0] == last[0] and event[1] - last[1] < _SAME_MOMENT:
+            groups[-1].append(event)
+        else:
+            groups.append([event])
+    for group in groups:
+        names = dict.fromkeys(name for _, _, name in group)
+        if len(names) > 1:
+            kind, time, _ = group[0]
+            yield (
+                f"The {kind} at {time:.2f} s is in {listed(names)} alike, so it comes with each "
+                f"run and did not happen once: look for what the rig does at that moment."
+            )
 
 
 def _rivals_text(step: Step, denials: Sequence[Denial]) -> str:

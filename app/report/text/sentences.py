@@ -59,11 +59,16 @@ def spring_label(kind: str) -> str:
 
 def pull_in_text(prediction: SimulatedRecord) -> str:
     """Return the voltage of the static pull-in of a prediction, or why there is none."""
-    if prediction.pull_in is not None:
-        return f"{significant(prediction.pull_in * 1e-3)} kV"
-    if prediction.open_limits:
-        return f"not known: the data do not determine {listed(map(symbol, prediction.open_limits))}"
-    return "none: the springs stiffen first"
+    limits = listed(map(symbol, prediction.open_limits))
+    unknown = (
+        f"no intervals of {limits} were computed"
+        if prediction.is_without_intervals
+        else f"the data do not determine {limits}"
+    )
+    if prediction.pull_in is None:
+        return f"not known: {unknown}" if limits else "none: the springs stiffen first"
+    voltage = f"{significant(prediction.pull_in * 1e-3)} kV"
+    return f"{voltage} with the model's limits, but {unknown}" if limits else voltage
 
 
 def listed(names: Iterable[str]) -> str:

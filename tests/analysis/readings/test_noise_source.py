@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,3 +127,19 @@ def test_prose_table_and_json_give_one_noise_and_one_error() -> None:
     assert float(cell) == pytest.approx(outcome_json(alone)["residual_over_noise"], rel=0.01)
     said = " ".join(identify_summary(alone))
     assert "noise floor is 3.00" in said
+
+
+@pytest.mark.parametrize(
+    ("p", "told"),
+    [
+        (1e-6, "The model is rejected: noise as that at rest leaves such a residual with p = 1e"),
+        (3e-3, "seldom leaves (p = 0.003): too often to reject the model, too seldom to trust it"),
+        (0.3, "which noise as that at rest does not exclude (p = 0.3)"),
+    ],
+)
+def test_a_residual_above_the_noise_is_told_by_its_probability(p: float, told: str) -> None:
+    outcome = identify_outcome()
+    (train, *_) = outcome.train
+    louder = replace(train, noise=train.errors.rms / 2.0, noise_source="lead-in")
+    louder.__dict__["misfit_p"] = p
+    assert told in " ".join(identify_summary(replace(outcome, train=(louder,))))

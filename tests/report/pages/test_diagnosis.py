@@ -460,6 +460,20 @@ class TestJson:
         measures = found["final"]["validation_by_record"][first.name]
         assert measures["rms_without_events_um"] == pytest.approx(0.5 * measures["rms_um"])
 
+    @pytest.mark.parametrize(("later", "alike"), [(0.01, True), (0.5, False)])
+    def test_an_event_at_one_moment_of_all_recordings_did_not_happen_once(self, later, alike):
+        outcome = diagnose_outcome()
+        event = OneTimeEvent("sudden change of reading", 4.2, 3e-5, "m")
+        (train, *_), (first, *others) = outcome.after.train, outcome.after.validation
+        after = replace(
+            outcome.after,
+            train=(replace(train, events=(event,)),),
+            validation=(replace(first, events=(replace(event, time=4.2 + later),)), *others),
+        )
+        said = " ".join(summary(replace(outcome, stands=(*outcome.stands[:-1], after))))
+        told = f"at 4.20 s is in {train.name} and {first.name} alike, so it comes with each run"
+        assert (told in said) == alike
+
     def test_its_numbers_are_those_of_the_outcome(self):
         outcome = diagnose_outcome()
         found = diagnosis_json(outcome)
