@@ -41,13 +41,7 @@ from dearig.config.notify import Notify
 from dearig.config.rigfile import RigFile
 from dearig.config.safe_ends import is_safe_end
 from dearig.config.sequencefile import LoadedSequence
-from dearig.errors import (
-    DearigError,
-    DiskFault,
-    InputError,
-    Interrupted,
-    SafetyStop,
-)
+from dearig.errors import DearigError, DiskFault, InputError, Interrupted, SafetyStop
 from dearig.output_state import Known, OutputState
 from dearig.printable import visible
 from dearig.progress import Progress, quiet

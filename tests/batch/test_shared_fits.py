@@ -55,6 +55,7 @@ def fitted(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 
     monkeypatch.setattr(shared_fits, "identify_shared", identify)
     monkeypatch.setattr(shared_fits, "errors_of", lambda _: {"rms_um": 1.0})
+    monkeypatch.setattr(shared_fits, "rejection_of", lambda _: {"rejected": False})
     return together
 
 
