@@ -13,7 +13,6 @@ import pytest
 from dearig.cli.terminal import diagnosis_tables
 from dearig.formulas import as_text, mathml
 from dearig.model import verdict as verdicts
-from dearig.model.diagnosis.events import OneTimeEvent
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting import Estimate
 from dearig.report.as_json import diagnosis_json
@@ -442,37 +441,6 @@ class TestJson:
         assert (found["experiment"] is None) == (outcome.experiment is None)
         assert (found["unnamed"] is None) == (outcome.finding.unnamed is None)
         assert found["seconds"] == 12.3
-
-    def test_events_of_a_recording_stand_beside_its_error(self):
-        outcome = diagnose_outcome()
-        (first, *others) = outcome.after.validation
-        event = OneTimeEvent("sudden change of reading", 4.2, 3e-5, "m")
-        first = replace(first, events=(event,), rms_without_events=0.5 * first.errors.rms)
-        after = replace(outcome.after, validation=(first, *others))
-        outcome = replace(outcome, stands=(*outcome.stands[:-1], after))
-        said = " ".join(summary(outcome))
-        assert f"In {first.name} there is a sudden change of reading of" in said
-        assert "at 4.20 s" in said
-        found = diagnosis_json(outcome)
-        assert found["events"] == [
-            {"record": first.name, "kind": event.kind, "at_s": 4.2, "size": 3e-5, "unit": "m"}
-        ]
-        measures = found["final"]["validation_by_record"][first.name]
-        assert measures["rms_without_events_um"] == pytest.approx(0.5 * measures["rms_um"])
-
-    @pytest.mark.parametrize(("later", "alike"), [(0.01, True), (0.5, False)])
-    def test_an_event_at_one_moment_of_all_recordings_did_not_happen_once(self, later, alike):
-        outcome = diagnose_outcome()
-        event = OneTimeEvent("sudden change of reading", 4.2, 3e-5, "m")
-        (train, *_), (first, *others) = outcome.after.train, outcome.after.validation
-        after = replace(
-            outcome.after,
-            train=(replace(train, events=(event,)),),
-            validation=(replace(first, events=(replace(event, time=4.2 + later),)), *others),
-        )
-        said = " ".join(summary(replace(outcome, stands=(*outcome.stands[:-1], after))))
-        told = f"at 4.20 s is in {train.name} and {first.name} alike, so it comes with each run"
-        assert (told in said) == alike
 
     def test_its_numbers_are_those_of_the_outcome(self):
         outcome = diagnose_outcome()

@@ -1,0 +1,43 @@
+"""What happened once, and what comes with each run, in sentences and JSON."""
+
+from dataclasses import replace
+
+import pytest
+
+from dearig.model.diagnosis.events import OneTimeEvent
+from dearig.report.as_json import diagnosis_json
+from dearig.report.text.diagnosis import summary
+from tests.tools.diagnosis import diagnose_outcome
+
+
+def test_events_of_a_recording_stand_beside_its_error():
+    outcome = diagnose_outcome()
+    (first, *others) = outcome.after.validation
+    event = OneTimeEvent("sudden change of reading", 4.2, 3e-5, "m")
+    first = replace(first, events=(event,), rms_without_events=0.5 * first.errors.rms)
+    after = replace(outcome.after, validation=(first, *others))
+    outcome = replace(outcome, stands=(*outcome.stands[:-1], after))
+    said = " ".join(summary(outcome))
+    assert f"In {first.name} there is a sudden change of reading of" in said
+    assert "at 4.20 s" in said
+    found = diagnosis_json(outcome)
+    assert found["events"] == [
+        {"record": first.name, "kind": event.kind, "at_s": 4.2, "size": 3e-5, "unit": "m"}
+    ]
+    measures = found["final"]["validation_by_record"][first.name]
+    assert measures["rms_without_events_um"] == pytest.approx(0.5 * measures["rms_um"])
+
+
+@pytest.mark.parametrize(("later", "alike"), [(0.01, True), (0.5, False)])
+def test_an_event_at_one_moment_of_all_recordings_did_not_happen_once(later, alike):
+    outcome = diagnose_outcome()
+    event = OneTimeEvent("sudden change of reading", 4.2, 3e-5, "m")
+    (train, *_), (first, *others) = outcome.after.train, outcome.after.validation
+    after = replace(
+        outcome.after,
+        train=(replace(train, events=(event,)),),
+        validation=(replace(first, events=(replace(event, time=4.2 + later),)), *others),
+    )
+    said = " ".join(summary(replace(outcome, stands=(*outcome.stands[:-1], after))))
+    told = f"at 4.20 s is in {train.name} and {first.name} alike, so it comes with each run"
+    assert (told in said) == alike
