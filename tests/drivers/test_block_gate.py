@@ -169,6 +169,10 @@ def test_what_is_no_limit_opens_no_gate(wrong):
         opened(**wrong)
 
 
+def test_without_authority_the_feedforward_alone_passes():
+    assert passed(opened(authority=0.0), [0.0, 0.0, 1e-6, 0.0]) == [0.0, 0.0]
+
+
 def test_no_other_way_in():
     played = feedforward()
     with pytest.raises(TypeError, match=r"only drivers\.gate\.open_block_gate"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from dearig.model.diagnosis.least_squares import bounded
+from dearig.model.diagnosis.least_squares import bounded, lagrange
 from dearig.model.diagnosis.regression import Regression, Start
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import extent_of, shape_points
@@ -133,3 +133,12 @@ def test_shapes_start_at_those_of_the_effect_and_spread_over_its_bounds() -> Non
     assert len(points) > len(EFFECTS["dielectric relaxation"].shape_parameters[0].starts)
     mains = shape_points(EFFECTS["mains interference"], extent, SETTINGS)
     assert (50.02,) in mains
+
+
+def test_interpolation_between_nodes_is_exact_for_a_cubic() -> None:
+    nodes = np.arange(4.0)
+    for t in (0.0, 0.4, 1.0, 1.7, 2.5, 3.0):
+        for powers in np.eye(4):
+            at_nodes = np.polynomial.polynomial.polyval(nodes, powers)
+            expected = np.polynomial.polynomial.polyval(t, powers)
+            assert lagrange(t) @ at_nodes == pytest.approx(expected, abs=1e-12)
