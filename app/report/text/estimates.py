@@ -55,7 +55,10 @@ def effect_table(outcome: DiagnoseOutcome) -> Table:
     final, rows = outcome.finding.final, []
     alone = len(outcome.finding.steps) == 1
     for step in outcome.finding.steps:
-        meanings = {p.name: p.meaning for p in EFFECTS[step.effect].parameters}
+        effect = EFFECTS[step.effect]
+        meanings = {p.name: p.meaning for p in effect.parameters}
+        if effect.drift_basis is not None:
+            meanings["rms"] = "root mean square of what the law adds to that recording"
         for e in step.estimates:
             about = meanings.get(e.name.split(" in ")[0], "")  # may be a parameter of one recording
             detail = "; ".join(w for w in (about, _note(e)) if w)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from dearig.model.fitting.parameters import Constraint
+from dearig.model.fitting.parameters import Constraint, Estimate
 from dearig.report.as_json import diagnosis_json
 from dearig.report.text.diagnosis import summary
 from dearig.report.text.estimates import (
@@ -15,7 +15,7 @@ from dearig.report.text.estimates import (
     effect_table,
     estimate_table,
 )
-from tests.tools.diagnosis import diagnose_outcome, finding
+from tests.tools.diagnosis import STEP, diagnose_outcome, finding
 
 
 def test_two_families_that_are_both_certain_are_said_to_be_certain() -> None:
@@ -67,3 +67,11 @@ def test_what_was_stated_may_be_why_a_model_is_rejected(verdict, told) -> None:
     made = replace(made, final=replace(made.final, estimates=(fixed, *others)))
     said = " ".join(summary(diagnose_outcome(finding=made)))
     assert ("a wrong value leaves more than noise too" in said) is told
+
+
+def test_the_size_of_a_drift_is_defined_where_it_stands() -> None:
+    size = Estimate("rms in thesis", "m", 4e-6, 3e-6, 5e-6, True)
+    drift = replace(STEP, effect="fitful drift", family="drift", estimates=(size,))
+    (row,) = effect_table(diagnose_outcome(finding=finding(steps=(drift,)))).rows
+    assert row.cells[0] == "rms in thesis"
+    assert row.detail == "root mean square of what the law adds to that recording"
