@@ -145,7 +145,6 @@ def run(folder: Path, *command: str | Path) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-@pytest.mark.deep
 def test_it_is_the_installed_package_that_runs(installed: Path, folder: Path) -> None:
     """Otherwise the tests below would prove nothing."""
     ended = run(folder, installed, "-P", "-c", "import dearig; print(dearig.__file__)")

@@ -140,7 +140,6 @@ def test_what_the_terminal_cannot_show_ends_nothing(lobe: Path, tmp_path: Path) 
     assert r"\xb5 (actuator, one lobe)" in ended.stdout
 
 
-@pytest.mark.deep
 def test_verbose_tells_of_events_on_standard_error(tmp_path: Path) -> None:
     write(tmp_path / "s.toml", LOBE)
     ended = run(

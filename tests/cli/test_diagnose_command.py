@@ -106,7 +106,6 @@ def diagnosed(bench: Path) -> dict:
     ).json  # fmt: skip
 
 
-@pytest.mark.deep
 class TestRecordWithAModel:
     def test_the_rig_obeys_it(self, bench):
         recording = open_recording(bench / "thesis.h5")
@@ -240,7 +239,7 @@ class TestOutputs:
         assert load_model(tmp_path / "m.toml").history["interrupted"] is True
         assert "The search was stopped" in check(tmp_path / "r.html").words
 
-    @pytest.mark.parametrize("words", mostly_deep([(), ("--thorough",)], [("--thorough",)]))
+    @pytest.mark.parametrize("words", [(), ("--thorough",)])
     def test_a_search_is_as_thorough_as_it_is_asked_to_be(self, bench, monkeypatch, words):
         asked = []
 

@@ -71,7 +71,6 @@ def test_every_command_goes_on(tmp_path: Path, name: str) -> None:
     assert not (work / "~").exists()
 
 
-@pytest.mark.deep
 def test_without_any_place_for_a_cache_one_sentence_says_so(tmp_path: Path) -> None:
     """The kernels are then compiled in every command; here none is needed."""
     code = (

@@ -6,7 +6,6 @@ import threading
 from pathlib import Path
 
 import psutil
-import pytest
 
 from dearig.acquisition.run import record
 from dearig.config.rigfile import RigFile
@@ -22,7 +21,6 @@ RIG = RigFile.model_validate(
 )
 
 
-@pytest.mark.deep
 def test_runs_on_a_card_leave_no_task_process_thread_or_file(tmp_path: Path) -> None:
     me = psutil.Process()
     others = set(me.children(recursive=True))  # of earlier tests, such as a tracker of resources

@@ -9,7 +9,7 @@ from dearig.model import effects
 from dearig.model.effects import EFFECTS
 from dearig.model.effects_contract import check_effect
 from dearig.model.errors import ModelError
-from tests.deep import one_of_each
+from tests.deep import mostly_deep, one_of_each
 from tests.tools.effect_plugin import FEW, add_distribution, run_with
 
 HEAD = '''"""A made effect."""
@@ -175,9 +175,8 @@ def worked_example():
     return source
 
 
-@pytest.mark.deep
 @pytest.mark.timeout(900)  # compiled, the kernels are compiled with the made effects
-@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("compiled", mostly_deep([False, True], [False]))
 def test_the_contract_tells_what_is_wrong_with_each_made_effect(compiled, tmp_path):
     """One test, since two processes that share the tests would each compile the kernels."""
     modules = {}

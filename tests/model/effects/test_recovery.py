@@ -298,7 +298,7 @@ def test_found_again(name, driven):
             ("load inertia", "slow branch"),
             ("electrode resistance", "elastoplastic hysteresis"),
         ],
-        kept=[],
+        kept=[("load inertia", "slow branch")],
     ),
     ids=" and ".join,
 )

@@ -20,7 +20,6 @@ def _elsewhere() -> ActuatorRecord:
     return record_of(PLAIN, drive, noise=1e-15)
 
 
-@pytest.mark.deep
 def test_it_is_the_spread_of_predictions_by_fits_to_many_noises() -> None:
     record, off = _elsewhere(), []
     for seed in range(12):

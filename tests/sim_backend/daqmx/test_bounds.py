@@ -328,7 +328,6 @@ def test_a_clock_that_jumps_far_costs_no_search_through_all_samples() -> None:
 # the terminal
 
 
-@pytest.mark.deep
 @needs_openssl
 @pytest.mark.skipif(sys.platform == "win32", reason="a process cannot be asked to end there")
 def test_nothing_that_a_client_does_writes_a_traceback_to_the_terminal(tmp_path: Path) -> None:
