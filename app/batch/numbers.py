@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
-from dearig.model.verdict import is_rejected
+from dearig.model.verdict import is_rejected, smallest_p
 from dearig.recording.json_file import finite
 from dearig.recording.reading.recording import Recording
 from dearig.units import SHOWN, parameter_key, parameter_unit
@@ -66,9 +66,9 @@ def errors_of(comparison: Comparison) -> dict[str, float]:
     return {name: float(value) for name, value in found.items() if math.isfinite(value)}
 
 
-def rejection_of(comparison: Comparison) -> dict[str, Any]:
-    """Return the probability that noise as that at rest leaves the residual, and what follows."""
-    p = comparison.misfit_p
+def rejection_of(*comparisons: Comparison) -> dict[str, Any]:
+    """Return the probability that noise as that at rest leaves the residuals, and what follows."""
+    p = smallest_p(c.misfit_p for c in comparisons)
     return {"misfit_p": finite(p), "rejected": None if p is None else is_rejected(p)}
 
 

@@ -12,7 +12,8 @@ from dearig.analysis.outcomes import (
     pooled_over_noise,
     pooled_steady_rms,
 )
-from dearig.model.verdict import COMPLETE, STOPPED, is_rejected, smallest_p
+from dearig.batch.numbers import rejection_of
+from dearig.model.verdict import COMPLETE, STOPPED
 from dearig.recording.json_file import finite
 from dearig.report.made import made_now
 from dearig.report.stored import Outcome, stored
@@ -67,7 +68,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
             "model": outcome.model_name,
             "model_path": outcome.model_path,
             **_noise_json(outcome.kind, outcome.comparisons),
-            **_rejection_json(outcome.comparisons),
+            **rejection_of(*outcome.comparisons),
             "recordings": [_comparison_json(c) for c in outcome.comparisons],
             "warnings": list(warnings_of(outcome)),
         }
@@ -83,7 +84,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "model_path": outcome.model_path,
         **_noise_json(outcome.kind, outcome.train),
         "residual_over_noise": finite(pooled_over_noise(outcome.train)),
-        **_rejection_json(outcome.train),
+        **rejection_of(*outcome.train),
         "prior_p": finite(fit.prior_p),
         "starts": [
             {"mean_square_over_noise": finite(cost), "followed": followed}
@@ -104,11 +105,6 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "seconds": finite(outcome.seconds),
         "warnings": list(warnings_of(outcome)),
     }
-
-
-def _rejection_json(comparisons: tuple[Comparison, ...]) -> dict[str, Any]:
-    p = smallest_p(c.misfit_p for c in comparisons)
-    return {"misfit_p": finite(p), "rejected": None if p is None else is_rejected(p)}
 
 
 def _noise_json(kind: str, comparisons: tuple[Comparison, ...]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.springs import LIMIT, SPRING_LAWS
 from dearig.report.text.laws import other_symbols, parameter_meanings
-from dearig.report.text.numbers import interval_ends, quoted, significant
+from dearig.report.text.numbers import interval, interval_ends, quoted, significant
 
 __all__ = ["latex_page"]
 
@@ -161,22 +161,21 @@ def _is_fixed(table: Mapping[str, Any]) -> bool:
     return isinstance(stated, Mapping) and "fixed" in stated
 
 
-def _row(symbol: str, value: float, unit: str, interval: tuple[Any, Any] | None) -> str:
-    if interval is None:
+def _row(symbol: str, value: float, unit: str, ends: tuple[Any, Any] | None) -> str:
+    if ends is None:
         return rf"${symbol}$ & {_math(significant(value, 6))} & {unit} & \\"
-    if interval[0] == _FIXED:
+    if ends[0] == _FIXED:
         return rf"${symbol}$ & {_math(significant(value, 6))} & {unit} & {_FIXED} \\"
-    open_low, open_high = (end is None for end in interval)
     # an end that the data leave open is 0 or infinite, and the history has neither
-    low = 0.0 if open_low else float(interval[0])
-    high = math.inf if open_high else float(interval[1])
+    low = 0.0 if ends[0] is None else float(ends[0])
+    high = math.inf if ends[1] is None else float(ends[1])
     shown = _math(quoted(value, low, high))
-    if open_low or open_high:
-        near = "" if open_low and open_high else _math(significant(low if open_high else high, 2))
-        ends = f"{'above' if open_high else 'below'} {near}" if near else "open"
+    if None in ends:
+        word, _, number = interval(low, high).partition(" ")
+        within = f"{word} {_math(number)}" if number else word
     else:
-        ends = f"[{', '.join(map(_math, interval_ends(low, high)))}]"
-    return rf"${symbol}$ & {shown} & {unit} & {ends} \\"
+        within = f"[{', '.join(map(_math, interval_ends(low, high)))}]"
+    return rf"${symbol}$ & {shown} & {unit} & {within} \\"
 
 
 def _math(number: str) -> str:

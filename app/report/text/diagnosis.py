@@ -428,7 +428,7 @@ _SAME_MOMENT = 0.02  # s: times of events are told to a hundredth
 
 
 def _events_of_each_run(comparisons: Sequence[Comparison]) -> Iterator[str]:
-    """Yield a sentence on each event that several recordings have at the same moment."""
+    """Yield a sentence on each event that all of several recordings have at the same moment."""
     found = sorted((e.kind, e.time, c.name) for c in comparisons for e in c.events)
     groups: list[list[tuple[str, float, str]]] = []
     for event in found:
@@ -439,7 +439,7 @@ def _events_of_each_run(comparisons: Sequence[Comparison]) -> Iterator[str]:
             groups.append([event])
     for group in groups:
         names = dict.fromkeys(name for _, _, name in group)
-        if len(names) > 1:
+        if len(names) == len(comparisons) > 1:
             kind, time, _ = group[0]
             yield (
                 f"The {kind} at {time:.2f} s is in {listed(names)} alike, so it comes with each "

@@ -46,7 +46,7 @@ _NAMES_MAX = 6  # more recordings than this are counted and not named
 _LIKELY = 0.05  # a strain energy that is less probable is not named
 # RMS over noise floor up to which the residual is almost only noise, and beyond which it is more
 _AT_NOISE, _ABOVE_NOISE = 1.1, 1.5
-_RARE = 0.05  # a probability below it is not quoted as agreement
+_RARE = 0.05  # one in twenty, the usual level: what is less probable is no agreement
 
 
 def spring_label(kind: str) -> str:

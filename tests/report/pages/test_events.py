@@ -32,12 +32,10 @@ def test_events_of_a_recording_stand_beside_its_error():
 def test_an_event_at_one_moment_of_all_recordings_did_not_happen_once(later, alike):
     outcome = diagnose_outcome()
     event = OneTimeEvent("sudden change of reading", 4.2, 3e-5, "m")
-    (train, *_), (first, *others) = outcome.after.train, outcome.after.validation
-    after = replace(
-        outcome.after,
-        train=(replace(train, events=(event,)),),
-        validation=(replace(first, events=(replace(event, time=4.2 + later),)), *others),
-    )
+    (train,), (first, last) = outcome.after.train, outcome.after.validation
+    first, train = (replace(c, events=(event,)) for c in (first, train))
+    last = replace(last, events=(replace(event, time=4.2 + later),))
+    after = replace(outcome.after, train=(train,), validation=(first, last))
     said = " ".join(summary(replace(outcome, stands=(*outcome.stands[:-1], after))))
-    told = f"at 4.20 s is in {train.name} and {first.name} alike, so it comes with each run"
+    told = f"at 4.20 s is in {train.name}, {first.name} and {last.name} alike, so it comes with"
     assert (told in said) == alike
