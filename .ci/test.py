@@ -9,16 +9,19 @@ from bootstrap import prepare, prepare_screen, run, start, wait
 DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 # the search for garbage takes a seventh of a compilation; without it memory grows to 1.4 GB
 QUICK = "import gc; gc.disable()\n"
-# two processes that find no kernels would compile them twice
-RUNS = "from dearig.acquisition.warm_up import compile_kernels; compile_kernels()"
+# Two processes that find no kernels would compile them twice: each compiles half of what both need,
+# in the order in which these imports made them, and then its own.
+HALF = "from tests.tools.fit_kernels import compile_fit_kernels, compile_half; compile_half({})\n"
+RUNS = HALF.format(0) + "from dearig.acquisition.warm_up import compile_kernels; compile_kernels()"
 # and a process that only collects leaves compiled modules to those that run
-FITS = """
-import pytest
-from tests.tools.fit_kernels import compile_fit_kernels
-
+FITS = (
+    HALF.format(1)
+    + """
 compile_fit_kernels()
+import pytest
 pytest.main(["--collect-only", "-qq"])
 """
+)
 COLD = "import sys; from dearig.acquisition.warm_up import is_warm; sys.exit(not is_warm())"
 
 

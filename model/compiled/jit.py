@@ -30,6 +30,7 @@ from numba.core.caching import (
     UserProvidedCacheLocator,
 )
 
+from dearig.model.compiled.addresses import names_in, provide
 from dearig.model.compiled.plugins import entry_points_found, source_files
 from dearig.model.compiled.trusted_folder import CacheFolder, cache_root, distrust_content, usable
 
@@ -184,6 +185,16 @@ class _Locator(UserProvidedCacheLocator):
 
 class _Implementation(CompileResultCacheImpl):
     _locator_classes = [_Locator]  # noqa: RUF012  (numba's own type of it)
+
+    def reduce(self, cres: Any) -> Any:
+        """Return what is written of a kernel, with the names by which it calls others."""
+        return names_in(cres.library._final_module), cast(Any, super()).reduce(cres)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """Return the kernel that was read, once all that it calls can be found."""
+        names, reduced = payload
+        provide(*names)
+        return cast(Any, super()).rebuild(target_context, reduced)
 
 
 class _FunctionCache(FunctionCache):

@@ -56,6 +56,12 @@ _COMBINE = MappingProxyType(
         "product": ("total = 1.0", "total *= {}", "total"),
     }
 )
+# Hooks of a few operations that each stage of a step calls: a call would take longer than they do.
+_INTO_CALLERS = ("supply", "polarise", "permittivity", "soften")
+# Types of what a hook returns, by the number of its values, and of on, c, m.
+_RETURNED = ("int64", "float64", "UniTuple(float64, 2)")
+_VECTOR = "float64[::1]"
+_FIRST = f"int64, {_VECTOR}, {_VECTOR}"
 # The order of effects is that of the signal path; a sensor's lag comes before its nonlinearity.
 _ORDER = ("amplifier", "electrode", "dielectric", "film stress", "inertia", "load", "environment")
 _LAST_BIT = 62  # of a 64-bit number that is not negative
@@ -144,10 +150,44 @@ def {effect}_stiffness(c, k, m, j, lam, rate):
 """
 
 
+# Which effects are not neutral: a loop, since a line for each parameter takes long to compile.
+_FINDER = """
+
+_{name}_at = np.array({at!r}, np.int64)
+_{name}_neutral = np.array({neutral!r}, np.float64)
+_{name}_bit = np.array({bits!r}, np.int64)
+
+
+@by_name("int64({vector})")
+def {name}(c):
+    found = 0
+    for i in range(len(_{name}_at)):
+        if c[_{name}_at[i]] != _{name}_neutral[i]:
+            found |= _{name}_bit[i]
+    return found
+"""
+
+
+def _finder(function: str, names: Iterable[str]) -> str:
+    """Return the source of a function that finds those of the effects that are not neutral."""
+    tests = [
+        (PLACES[name].column(effect, p.name), p.neutral, _OF_EFFECT[name])
+        for name, effect in ((name, EFFECTS[name]) for name in names)
+        for p in effect.parameters
+        if p.neutral is not None
+    ]
+    at, neutral, bits = (list(values) for values in zip(*tests, strict=True))
+    return _FINDER.format(name=function, at=at, neutral=neutral, bits=bits, vector=_VECTOR)
+
+
 def _text() -> str:
     """Return the source of the hooks."""
     names = sorted(EFFECTS, key=_rank)
-    lines = ["from dearig.model.compiled.jit import jit"]
+    lines = [
+        "import numpy as np",
+        "from dearig.model.compiled.by_name import by_name",
+        "from dearig.model.compiled.jit import jit",
+    ]
     modules = {name: f"_effect_{i}" for i, name in enumerate(names)}
     lines += [f"import {PLACES[n].module.__name__} as {alias}" for n, alias in modules.items()]
     lines += [
@@ -158,7 +198,9 @@ def _text() -> str:
     for hook, (arguments, how) in HOOKS.items():
         taking = f", {arguments}" if arguments else ""
         first, each, last = _COMBINE.get(how, ("", f"{how} = {{}}", how))
-        lines += ["", "", "@jit", f"def {hook}(on, c, m{taking}):", f"    {first}"]
+        types = f"{_RETURNED[HOOKS[hook].values]}({_FIRST}{', float64' * len(arguments.split())})"
+        decorator = "jit" if hook in _INTO_CALLERS else f'by_name("{types}")'
+        lines += ["", "", f"@{decorator}", f"def {hook}(on, c, m{taking}):", f"    {first}"]
         taken = [n for n in names if _has(n, hook)]
         # in groups of four: where none of a group is active, one test skips it
         for some in (taken[i : i + 4] for i in range(0, len(taken), 4)):
@@ -175,10 +217,8 @@ def _text() -> str:
                 ]
         lines.append(f"    return {last}")
     for function, of_sensor in (("active", False), ("active_sensors", True)):
-        lines += ["", "", "@jit", f"def {function}(c):", "    found = 0"]
-        for name in (n for n in names if PLACES[n].is_sensor == of_sensor):
-            lines += [f"    if {_active(name)}:", f"        found |= {_OF_EFFECT[name]}"]
-        lines.append("    return found")
+        tested = [n for n in names if PLACES[n].is_sensor == of_sensor]
+        lines.append(_finder(function, tested))
     return "\n".join([*lines, ""])
 
 

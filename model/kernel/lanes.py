@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from dearig.model.coefficients import INERTIA, REST
+from dearig.model.compiled.by_name import by_name
 from dearig.model.compiled.jit import allocating, jit, read_only
 from dearig.model.compiled.packs import WIDTH, rows
 from dearig.model.effects import MEMORY
@@ -48,7 +49,10 @@ _Arrays = tuple[_Array, _Array, _Array, _Array, _Array, _Array]
 _GRAIN = 1e-3  # of the stiffness: propagators of a log differ by more, see STIFFNESS_NEAR
 
 
-@jit
+@by_name(
+    "none(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], "
+    "float64, float64, float64, float64, int64, float64[:, ::1])"
+)
 def _carry_plain(
     table: np.ndarray,
     branches: np.ndarray,
@@ -69,7 +73,11 @@ def _carry_plain(
     )  # fmt: skip
 
 
-@jit
+@by_name(
+    "none(int64, float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], "
+    "float64[::1], float64[:, ::1], float64[:, ::1], float64, float64, float64, float64, float64, "
+    "int64, float64[:, ::1])"
+)
 def _carry(
     moving: int,
     values: np.ndarray,
@@ -118,8 +126,8 @@ def _follow(
     """Carry packs of films along a record: as ``log`` (N, LOG) says."""
     films, samples = moved.shape
     packs = tables.shape[0]
-    moving = 0
-    for film in range(packs * WIDTH):
+    moving = acting[0, 0]
+    for film in range(1, packs * WIDTH):
         moving |= acting[film // WIDTH, film % WIDTH]
     warm = air.shape[1] == samples
     row, grain = 0, _GRAIN * max(log[0, 1], 1.0)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, HELD, INERTIA, REST
+from dearig.model.compiled.by_name import by_name
 from dearig.model.compiled.jit import allocating, inlined, jit, read_only
 from dearig.model.compiled.packs import WIDTH, rows
 from dearig.model.effects import MEMORY, SENSOR_MEMORY
@@ -142,7 +143,10 @@ def _all_admissible(room: _Pack) -> bool:
     return good
 
 
-@jit
+@by_name(
+    "none(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], "
+    "float64, float64, float64, float64, int64, int64, float64[:, ::1])"
+)
 def _steps(
     table: np.ndarray,
     gives: np.ndarray,
@@ -240,16 +244,11 @@ def _follow(
 
 
 @allocating
-def _in_pack(
-    cs: np.ndarray,
-    time: np.ndarray,
-    voltage: np.ndarray,
-    ends: np.ndarray,
-    fidelity: int,
-    stretch: np.ndarray,
-    rate: np.ndarray,
-) -> tuple[bool, int]:
-    """Do what ``_follow`` does: the arrays it needs, and the loop."""
+def _prepared(cs: np.ndarray, voltage: float, fidelity: int) -> tuple[Policy, _Pack]:
+    """Return the steps of films ``cs`` (WIDTH, C) and their arrays, at rest at ``voltage``.
+
+    As in ``drive``, what makes arrays and the loop are called one after the other.
+    """
     count = branch_count(cs[0])
     size = 2 + count + MEMORY
     room = _Pack(
@@ -277,10 +276,9 @@ def _in_pack(
         room.table[:, i] = film_table(cs[i], springs)
         for j in range(2 + count):
             room.y[j, i] = room.alone[i, j] = 0.0 if j == 1 else cs[i, REST]
-        start_ringing(cs[i], springs, room.alone[i], voltage[0], work, trace)
+        start_ringing(cs[i], springs, room.alone[i], voltage, work, trace)
         room.trace[0, i] = room.trace[1, i] = trace[0]
-    policy = policy_of(0, 0, True, fidelity)
-    return _follow(policy, cs, time, voltage, ends, stretch, rate, room)
+    return policy_of(0, 0, True, fidelity), room
 
 
 @jit
@@ -368,7 +366,8 @@ def read_population(
         # in quick steps a film alone ends elsewhere than in a pack, and costs are compared
         together = together and (end - begin >= _WORTH or fidelity == COARSE)
         if together:
-            together, steps = _in_pack(pack, *record, fidelity, stretch, rate)
+            policy, room = _prepared(pack, voltage[0], fidelity)
+            together, steps = _follow(policy, pack, *record, stretch, rate, room)
             taken += steps
         for i in range(end - begin):
             rest = pack[i, REST]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, INERTIA, UNIFORM
-from dearig.model.compiled.jit import inlined, jit
+from dearig.model.compiled.by_name import by_name
+from dearig.model.compiled.jit import inlined
 from dearig.model.kernel.effect_forces import (
     COMMIT,
     affected,
@@ -17,6 +18,9 @@ from dearig.model.kernel.motion import rates
 from dearig.model.kinematics import electric
 
 __all__ = ["rk4_steps"]
+
+_VECTOR, _MATRIX = "float64[::1]", "float64[:, ::1]"
+_PLAIN = f"{_VECTOR}, {_MATRIX}, {_VECTOR}, {'float64, ' * 5}int64, int64, {_MATRIX}, {_VECTOR}"
 
 
 @inlined
@@ -98,7 +102,7 @@ def _steps(
             commit(acting, c, m, y[0], y[1], lam0, h, t)
 
 
-@jit
+@by_name(f"none({_PLAIN})")
 def _steps_without_effects(
     c: np.ndarray,
     springs: np.ndarray,
@@ -116,7 +120,7 @@ def _steps_without_effects(
     _steps(0, c, springs, y, v0, v1, t0, warmth, h, steps, stride, work, trace)
 
 
-@jit
+@by_name(f"none(int64, {_PLAIN})")
 def _steps_with_effects(
     acting: int,
     c: np.ndarray,
