@@ -8,6 +8,8 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -21,8 +23,14 @@ SCREEN = [
 ]  # fmt: skip
 
 
-def prepare(extras: str = "", venv: Path = VENV) -> Path:
-    """Install the project with ``extras`` into ``venv`` unless it is there; return its Python."""
+def prepare(
+    extras: str = "", venv: Path = VENV, meanwhile: Callable[[Path], None] | None = None
+) -> Path:
+    """Install the project with ``extras`` into ``venv`` unless it is there; return its Python.
+
+    ``meanwhile`` is called with the Python as soon as that has what the project without extras
+    needs: pip keeps one processor busy, so it may start work for another.
+    """
     if not (3, 11) <= sys.version_info[:2] <= (3, 14):
         sys.exit(f"dearig needs Python 3.11 to 3.14; this is {sys.version.split()[0]}")
     python = venv / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
@@ -33,6 +41,8 @@ def prepare(extras: str = "", venv: Path = VENV) -> Path:
     ).hexdigest()
     stamp = venv / "installed"
     if stamp.is_file() and stamp.read_text().strip() == wanted and python.exists():
+        if meanwhile is not None:
+            meanwhile(python)
         return python
     if importlib.util.find_spec("ensurepip") is None:
         _install_venv_package()
@@ -41,17 +51,24 @@ def prepare(extras: str = "", venv: Path = VENV) -> Path:
         # by a new interpreter: one that was here before ensurepip was installed may not see it
         subprocess.run([sys.executable, "-m", "venv", "--clear", str(venv)], check=True)
     print(f"Installing dearig and its requirements into {venv.name} ...", flush=True)
-    project = str(ROOT) + (f"[{extras}]" if extras else "")
+    if meanwhile is not None:
+        project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+        _install(python, *project["dependencies"])
+        meanwhile(python)
+    _install(python, "--editable", str(ROOT) + (f"[{extras}]" if extras else ""))
+    stamp.write_text(wanted)
+    return python
+
+
+def _install(python: Path, *what: str) -> None:
     subprocess.run(
         [
             str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
             # most modules are never imported; Python compiles the others when they are
-            "--no-compile", "--constraint", str(CONSTRAINTS), "--editable", project,
+            "--no-compile", "--constraint", str(CONSTRAINTS), *what,
         ],
         check=True,
     )  # fmt: skip
-    stamp.write_text(wanted)
-    return python
 
 
 # the plugin for a real screen needs more libraries than Qt itself

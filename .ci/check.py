@@ -7,16 +7,17 @@ import argparse
 import sys
 
 import static
-from bootstrap import ROOT, VENV, prepare, run
-from test import test
+from bootstrap import ROOT, VENV, run
+from test import prepare_all, test
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--venv", default=VENV)
     options, others = parser.parse_known_args()
-    python = prepare("test", ROOT / options.venv)
+    python, code = prepare_all(ROOT / options.venv)
     sys.exit(
-        test(python, *others)
+        code
+        or test(python, *others)
         or run([str(python), "-m", "tests.deep", "--today"])
         or static.check(python)
     )
