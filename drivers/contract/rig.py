@@ -6,7 +6,7 @@ Derive a class ``Test...`` from ``RigContract`` and return the opened rig from `
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, cast
@@ -122,14 +122,14 @@ CALLS: dict[str, Callable[[Rig], object]] = {
     "identify": lambda rig: rig.identify(),
 }
 
-#: Calls that a rig allows in each state.
-ALLOWED: dict[RigState, Set[str]] = {
-    RigState.SAFE: {"identify", "load"},
-    RigState.LOADED: {"identify", "arm"},
-    RigState.ARMED: {"identify", "start"},
-    RigState.RUNNING: {"identify", "read", "stop"},
-    RigState.DONE: {"identify", "load", "read", "stop"},
-    RigState.CLOSED: frozenset(),
+#: Calls that a rig allows in each state; the last one may end it.
+ALLOWED: dict[RigState, tuple[str, ...]] = {
+    RigState.SAFE: ("identify", "load"),
+    RigState.LOADED: ("identify", "arm"),
+    RigState.ARMED: ("identify", "start"),
+    RigState.RUNNING: ("identify", "read", "stop"),
+    RigState.DONE: ("identify", "read", "stop", "load"),
+    RigState.CLOSED: (),
 }
 
 
@@ -204,15 +204,15 @@ class RigContract:
         assert rig.identify() == first
 
     @pytest.mark.parametrize("state", list(RigState))
-    @pytest.mark.parametrize("call", list(CALLS))
-    def test_calls_out_of_order_are_refused(self, rig: Rig, state: RigState, call: str) -> None:
+    def test_calls_out_of_order_are_refused(self, rig: Rig, state: RigState) -> None:
         bring_to(rig, state)
-        if call in ALLOWED[state]:
-            CALLS[call](rig)
-        else:
-            with pytest.raises(RigStateError, match=f"{call}: the rig is {state.value}"):
-                CALLS[call](rig)
+        allowed = ALLOWED[state]
+        for name in (name for name in CALLS if name not in allowed):
+            with pytest.raises(RigStateError, match=f"{name}: the rig is {state.value}"):
+                CALLS[name](rig)
             assert rig.state is state
+        for name in allowed:
+            CALLS[name](rig)
 
     def test_states_follow_each_other(self, rig: Rig) -> None:
         seen = [rig.state]
