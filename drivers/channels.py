@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,8 +55,7 @@ class Scaling:
 
     def physical(self, counts: np.ndarray) -> np.ndarray:
         """Physical values (float64) of ``counts``, any shape."""
-        volts = np.polynomial.polynomial.polyval(counts.astype(np.float64), self.coefficients)
-        return self.offset + self.gain * volts
+        return self.offset + self.gain * _polynomial(counts.astype(np.float64), self.coefficients)
 
     def counts(self, physical: np.ndarray) -> np.ndarray:
         """Return the nearest int16 counts of ``physical``, saturated at the converter's ends.
@@ -76,10 +76,21 @@ class Scaling:
         linear, error = raw, bend * COUNT_MAX
         while error > _INVERSION_TOLERANCE:  # each iteration multiplies the error by this change
             raw = np.clip(raw, COUNT_MIN, COUNT_MAX)
-            bent = np.polynomial.polynomial.polyval(raw, higher) * raw * raw
+            bent = _polynomial(raw, higher) * raw * raw
             raw = linear - bent / first
             error *= bend
         return np.clip(np.rint(raw), COUNT_MIN, COUNT_MAX).astype(np.int16)
+
+
+def _polynomial(x: np.ndarray, coefficients: Sequence[float]) -> np.ndarray:
+    """Return the polynomial in ``x`` with ``coefficients``, lowest power first.
+
+    NumPy's own function takes several times as long for a block of samples.
+    """
+    value = np.full_like(x, coefficients[-1])
+    for coefficient in coefficients[-2::-1]:
+        value = coefficient + value * x
+    return value
 
 
 @dataclass(frozen=True)

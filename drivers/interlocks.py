@@ -108,6 +108,7 @@ class Interlocks:
         self._lead_in_sum = self._lead_in_samples = 0  # readings of the lead-in
         self._rest: float | None = None  # m, the laser's reading at the loaded rest state
         self._rest_from = 0  # sample
+        self._allowed: tuple[int, int] | None = None  # counts, from the rest state
         self._left_plan = False  # True once the command has left the plan
         self._still = _StuckDetector()
         self._broken = {
@@ -311,8 +312,10 @@ class Interlocks:
         if self._rest is None or not self._live("displacement"):
             return
         locks = self._locks
-        bounds = np.array([locks.displacement_min_mm, locks.displacement_max_mm]) * 1e-3
-        low, high = _sorted(self._laser.counts(self._rest + bounds))
+        if self._allowed is None:
+            bounds = np.array([locks.displacement_min_mm, locks.displacement_max_mm]) * 1e-3
+            self._allowed = _sorted(self._laser.counts(self._rest + bounds))
+        low, high = self._allowed
         broken = (reading < low) | (reading > high)
         broken[: max(0, self._rest_from - self._watched)] = False
         at = self._broken["displacement"].first(broken)

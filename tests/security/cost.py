@@ -7,6 +7,7 @@ standard input. Linux only: elsewhere a process cannot limit its memory.
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib
 import io
 import json
@@ -113,11 +114,14 @@ def _import_commands() -> None:
         "dearig.report.pages.html", "openpyxl", "pyqtgraph", "rich.progress", "rich.table",
     ):  # fmt: skip
         importlib.import_module(name)
+    import typer.main
+
     from dearig.cli.main import app
     from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
     from dearig.model.simulation.actuator import Actuator
 
     Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3).rest()  # loads the compiler and its kernels
+    typer.main.get_command = functools.cache(typer.main.get_command)  # builds the commands once
     with contextlib.redirect_stdout(io.StringIO()):
         app(["presets"], prog_name="dearig", standalone_mode=False)
 

@@ -693,7 +693,7 @@ def extra(name, p, film, drive):
     return known[name]()
 
 
-def follow(film, drive, time, effect, tolerance=1e-9, step=1e-4):
+def follow(film, drive, time, effect, tolerance=1e-8, step=1e-4):
     """Stretch (N,) at ``time`` under ``drive`` (v(t), with ``breaks`` where it has corners)."""
     mu0, limit0 = film.first
     n = len(film.branches)
@@ -728,7 +728,7 @@ def follow(film, drive, time, effect, tolerance=1e-9, step=1e-4):
         inside = (time >= start - 1e-12) & (time <= end + 1e-12)
         done = solve_ivp(
             lambda t, y: rates(t, y.tolist()), (start, end), y, method=effect.method,
-            t_eval=np.clip(time[inside], start, end), rtol=tolerance, atol=1e-12, max_step=2e-3,
+            t_eval=np.clip(time[inside], start, end), rtol=tolerance, atol=1e-11, max_step=4e-3,
         )  # fmt: skip
         out[inside] = done.y[0, : inside.sum()]
         y = done.y[:, -1]

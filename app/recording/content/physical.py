@@ -176,11 +176,15 @@ class Counts:
     """
 
     def __init__(
-        self, entry: h5py.Group, samples: int | None = None, rest: Rest | None = None
+        self,
+        entry: h5py.Group,
+        samples: int | None = None,
+        rest: Rest | None = None,
+        channels: tuple[Channel, ...] | None = None,
     ) -> None:
         self._entry = entry
         self.data: h5py.Group = entry["data"]
-        self.channels = read_channels(self.data)
+        self.channels = read_channels(self.data) if channels is None else channels
         self.rate = float(self.data.attrs["rate_Hz"])
         self.average = average_of(self.data)
         # time of the first row in rows: a row's time is the mean of its ticks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,26 +67,27 @@ class Arrays:
     def read(self, name: str) -> np.ndarray:
         """Return all values (N,) of ``name``; they are read once and kept."""
         if name not in self._read:
-            values = self.window(name, 0, self.samples)
+            self.load((name,))
+        return self._read[name]
+
+    def load(self, names: Iterable[str]) -> None:
+        """Read all values of ``names`` and keep them; the file is opened once."""
+
+        def whole(entry: h5py.Group) -> dict[str, np.ndarray]:
+            return {name: self._cut(entry, name, 0, self.samples) for name in names}
+
+        for name, values in self._of_entry(whole).items():
             if name in self.stored:
                 self._check(name, values)
             values.setflags(write=False)
             self._read[name] = values
-        return self._read[name]
 
     def window(self, name: str, start: int, stop: int) -> np.ndarray:
         """Return ``name`` from sample ``start`` to before ``stop``, (n,); only these are read."""
         start, stop = max(start, 0), min(stop, self.samples)
         if name in self._read:
             return self._read[name][start:stop]
-
-        def cut(entry: h5py.Group) -> np.ndarray:
-            if name in self.stored:
-                values: np.ndarray = self._row(entry, name)[start:stop].astype(np.float64)
-                return values
-            return self._counts(entry).window(name, start, stop)
-
-        return self._of_entry(cut)
+        return self._of_entry(lambda entry: self._cut(entry, name, start, stop))
 
     def shortened(self, samples: int) -> Arrays:
         """Return the first ``samples`` of the same values."""
@@ -125,6 +126,12 @@ class Arrays:
             return look(entry)
 
         return read_from(self.path, look_at)
+
+    def _cut(self, entry: h5py.Group, name: str, start: int, stop: int) -> np.ndarray:
+        if name in self.stored:
+            values: np.ndarray = self._row(entry, name)[start:stop].astype(np.float64)
+            return values
+        return self._counts(entry).window(name, start, stop)
 
     def _row(self, entry: h5py.Group, name: str) -> h5py.Dataset:
         data = group(entry, "data")

@@ -58,8 +58,7 @@ def open_recording(path: str | Path) -> Recording:
         recording = read_from(path, lambda file: _Reader(path, file).read())
         if recording.samples <= EAGER:
             try:
-                for name in recording.arrays.stored:
-                    recording.arrays.read(name)
+                recording.arrays.load(recording.arrays.stored)
             except ReplacedError:
                 if left:
                     continue
@@ -120,7 +119,7 @@ class _Reader:
         rate: float | None = None
         if channels:
             rate = self._rate(data)
-            counts = Counts(entry, samples=self._stored_samples(data, stored))
+            counts = Counts(entry, self._stored_samples(data, stored), channels=channels)
             derived, rest = counts.names, counts.rest
             samples = counts.samples
         elif "time" not in stored:

@@ -26,7 +26,7 @@ ENABLE = "port0/line0"
 LONG = lobes(peaks=(8000.0,) * 12)
 #: Calls to the card from ``arm`` to the end of a ramp, among them all that output something.
 STEPS = {"StartTask", "StopTask", "WriteAnalogF64", "TaskControl", "CfgSampClkTiming"}
-CALLS_MAX = 400  # of a run from its waveform to its end; far more than it makes
+CALLS_MAX = 400  # of a run from its arming to its end; far more than it makes
 
 
 class SameProcess(Watcher):
@@ -108,14 +108,14 @@ def guarded(freeze: Freeze, settings: RigFile) -> Iterator[Bench]:
         yield bench
 
 
-def whole_run(rig: DaqmxRig, *, stopped: bool) -> None:
-    """Go through every step of a run; the waveform is left by a ramp if it is ``stopped``."""
-    begin(rig, LONG)
+def run_to_its_ramp(rig: DaqmxRig) -> None:
+    """Go through every step of the run of a loaded ``rig``, up to the end of a stop's ramp."""
+    rig.arm()
+    rig.start()
     rig.read()
     rig.read()
-    if stopped:
-        rig.stop()
-        drain(rig)
+    rig.stop()
+    drain(rig)
 
 
 @pytest.mark.parametrize(
@@ -129,10 +129,11 @@ def test_run_that_goes_on_after_its_guardian_acted_never_raises_a_voltage(freeze
     with guarded(freeze, settings) as bench:
         steps = set()
         for number in range(1, CALLS_MAX):
+            bench.rig.load(LONG)  # before it is armed, the guardian does not watch
             freeze.number, freeze.struck, freeze.raised = number, False, []
             error = ""
             try:
-                whole_run(bench.rig, stopped=True)
+                run_to_its_ramp(bench.rig)
             except RigError as failed:
                 error = str(failed)
             if freeze.number > 0:
@@ -158,7 +159,9 @@ def test_run_that_goes_on_after_its_guardian_acted_never_raises_a_voltage(freeze
 @pytest.mark.parametrize("held", [True, False], ids=["guardian-holds", "guardian-ended"])
 def test_run_that_goes_on_leaves_the_next_programs_run_alone(freeze, held):
     with guarded(freeze, WIRED) as bench:
-        whole_run(bench.rig, stopped=False)
+        begin(bench.rig, LONG)
+        bench.rig.read()
+        bench.rig.read()
         bench.guardian.guard.silence()
         if held:
             with pytest.raises(RigError, match="in use by another program"):

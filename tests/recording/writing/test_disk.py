@@ -53,7 +53,7 @@ def room(monkeypatch: pytest.MonkeyPatch, free: float) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(10**12, 0, int(free)))
 
 
-@pytest.mark.parametrize("samples", [20_000, 300_000, 1_000_000])
+@pytest.mark.parametrize("samples", [20_000, 500_000])
 def test_the_estimate_is_near_the_file_of_a_very_long_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int
 ) -> None:
@@ -69,8 +69,9 @@ def test_the_estimate_is_near_the_file_of_a_very_long_run(
 BENT = Scaling((-4.62141825e-04, 3.05202888e-04, -2.47733456e-13, 5.43883236e-18), 4e-3)
 
 
-@pytest.mark.parametrize("samples", [3000, 300_000])
-@pytest.mark.parametrize("rate", [RATE, 12345.678])
+@pytest.mark.parametrize(
+    ("samples", "rate"), [(3000, RATE), (3000, 12345.678), (300_000, 12345.678)]
+)
 def test_the_end_of_a_run_of_noise_needs_no_more_than_the_estimate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int, rate: float
 ) -> None:
