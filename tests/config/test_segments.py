@@ -155,36 +155,36 @@ def test_a_kind_of_another_distribution_is_found_everywhere(tmp_path: Path) -> N
     assert found.splitlines() == ["True True ()", "3000.0"]
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "source", "words"),
-    [
-        ("hold", "bad:Thing", "Thing = 1", "the name 'hold' is already taken"),
-        ("other", "bad:Thing", "Thing = 1", "not a subclass of dearig.config.segments.Segment"),
-        ("other", "bad:Thing", "import no_such_module_at_all", "no_such_module_at_all"),
-        ("other", "bad:Thing", "raise SystemExit(3)", "3"),
-        ("other", "bad:Gone", "Thing = 1", "Gone"),
-        (
-            "other",
-            "bad:Thing",
-            "from dearig.config.segments.levels import HoldSegment as Thing",
-            'must be of the type Literal["other"]',
-        ),
-    ],
-)
-def test_a_kind_that_cannot_be_used_is_left_out_with_a_sentence(
-    tmp_path: Path, name: str, value: str, source: str, words: str
-) -> None:
+#: Kinds that cannot be used: the object that is named, its module, and what is said.
+UNUSABLE = {
+    "hold": ("Thing", "Thing = 1", "the name 'hold' is already taken"),
+    "number": ("Thing", "Thing = 1", "not a subclass of dearig.config.segments.Segment"),
+    "absent": ("Thing", "import no_such_module_at_all", "no_such_module_at_all"),
+    "leaving": ("Thing", "raise SystemExit(3)", "3"),
+    "nameless": ("Gone", "Thing = 1", "Gone"),
+    "other": (
+        "Thing",
+        "from dearig.config.segments.levels import HoldSegment as Thing",
+        'must be of the type Literal["other"]',
+    ),
+}
+
+
+def test_kinds_that_cannot_be_used_are_left_out_with_a_sentence(tmp_path: Path) -> None:
     found = run_with_distribution(
         tmp_path,
-        {"bad.py": source},
-        {"dearig.segments": {name: value}},
+        {f"bad_{name}.py": source for name, (_, source, _) in UNUSABLE.items()},
+        {"dearig.segments": {name: f"bad_{name}:{made[0]}" for name, made in UNUSABLE.items()}},
         """
         from dearig.config.segments import SEGMENT_KINDS
         print(len(SEGMENT_KINDS), SEGMENT_KINDS["hold"].__module__)
-        print(*SEGMENT_KINDS.left_out)
+        print(*SEGMENT_KINDS.left_out, sep="\\n")
         """,
     )
-    count, sentence = found.splitlines()
+    count, *sentences = found.splitlines()
     assert count == f"{len(SEGMENT_KINDS)} dearig.config.segments.levels"
-    assert sentence.startswith(f"the plug-in {name} (dearig.segments) of made is left out: ")
-    assert words in sentence
+    begins = "the plug-in {} (dearig.segments) of made is left out: "
+    for name, (_, _, words) in UNUSABLE.items():
+        (sentence,) = (said for said in sentences if said.startswith(begins.format(name)))
+        assert words in sentence.removeprefix(begins.format(name))
+    assert len(sentences) == len(UNUSABLE)

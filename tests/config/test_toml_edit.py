@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dearig.config.toml_edit import split_segments, with_key, written_anew
+from tests.deep import examples
 
 RIG = """\
 # our rig
@@ -131,6 +132,7 @@ values = st.one_of(
 )  # fmt: skip
 
 
+@examples(100, suite=25)
 @given(st.lists(st.tuples(st.integers(0, 1), keys, st.one_of(values, st.none())), max_size=5))
 def test_any_edits_give_the_tables_that_are_wanted(edits: list[tuple[int, str, Any]]) -> None:
     texts = split_segments(SEQUENCE)

@@ -45,8 +45,7 @@ CHANGES: dict[str, Callable[[Path, Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_nothing_changes_the_file_of_a_live_run(tmp_path: Path, change: str) -> None:
+def test_nothing_changes_the_file_of_a_live_run(tmp_path: Path) -> None:
     path, other = tmp_path / "run.h5", tmp_path / "other.h5"
     write_run(other)
     clock = Clock()
@@ -56,9 +55,10 @@ def test_nothing_changes_the_file_of_a_live_run(tmp_path: Path, change: str) -> 
     before = names(tmp_path)
     # the time of the last change says nothing: a run can be stopped, a clock can be set
     os.utime(path, (LONG_AGO, LONG_AGO))
-    with pytest.raises(InputError, match=r"run\.h5 is in use: a run records to it"):
-        CHANGES[change](path, other)
-    assert names(tmp_path) == before
+    for change, do in CHANGES.items():
+        with pytest.raises(InputError, match=r"run\.h5 is in use: a run records to it"):
+            do(path, other)
+        assert names(tmp_path) == before, change
     recorder.append(Block(2000, run_counts(3000)[:, 2000:]))
     recorder.close()
     assert verify(path).sound

@@ -174,11 +174,12 @@ def test_clocks_that_disagree(tmp_path: Path) -> None:
     clock = Clock()
     path = tmp_path / "run.h5"
     identity = replace(IDENTITY, simulated=False)
-    with writer(path, identity=identity, samples_expected=30_000, now=clock) as recorder:
-        counts = run_counts(30_000)
+    run = {"rate_Hz": 100.0, "samples_expected": 3000, "now": clock}
+    with writer(path, identity=identity, **run) as recorder:
+        counts = run_counts(3000)
         for i in range(30):
             clock.moment += 1.05
-            recorder.append(Block(1000 * i, counts[:, 1000 * i : 1000 * i + 1000]))
+            recorder.append(Block(100 * i, counts[:, 100 * i : 100 * i + 100]))
     assert any("counted 29 s and the computer's clock 30.45 s" in f for f in verify(path).faults)
 
 

@@ -44,14 +44,19 @@ class Bench:
         self.guardian = GuardianProcess(address, settings or patient, clock=self.clock)
 
 
+@pytest.fixture(scope="module")
+def card():
+    with served(client_timeout=None) as made:
+        yield made
+
+
 @pytest.fixture
-def bench():
-    with served(client_timeout=None) as card:
-        made = Bench(card)
-        try:
-            yield made
-        finally:
-            made.guardian.close()
+def bench(card):
+    made = Bench(card)
+    try:
+        yield made
+    finally:
+        made.guardian.close()
 
 
 def beat_for(bench, beats, interval=0.1):
@@ -102,7 +107,10 @@ def test_guardian_that_goes_on_answers_again(bench):
     assert bench.guardian.beat()
 
 
-def test_late_read_is_no_dead_guardian(bench):
+def test_guardian_says_what_the_system_granted_and_a_late_read_is_no_dead_guardian(bench):
+    said = " ".join((*bench.guardian.granted, *bench.guardian.refused))
+    assert "priority" in said
+    assert "locked memory" in said
     bench.guardian.arm()
     beat_for(bench, 20, interval=30.0)
 
@@ -123,9 +131,9 @@ def test_half_an_hour_of_beats_passes_and_nothing_grows(bench):
     assert bench.guardian.report() is None
 
 
-def test_silence_is_a_frozen_run_whatever_the_pipe_holds(bench):
+def test_silence_is_a_frozen_run_whatever_the_pipe_holds(card):
     settings = RigFile.model_validate({"guardian": {"timeout_s": 0.3}})
-    quick = Bench(bench.card, settings)
+    quick = Bench(card, settings)
     quick.guardian.arm()
     report = quick.guardian.report(REPORTS_WITHIN)
     assert report.why == "the run is frozen"
@@ -133,7 +141,7 @@ def test_silence_is_a_frozen_run_whatever_the_pipe_holds(bench):
     assert "the voltage monitor confirmed it" in report.sentence
     with pytest.raises(RigError, match=r"held at 0 V: the guardian acted at .* is frozen"):
         quick.guardian.arm()
-    with nidaqmx.Task(grpc_options=bench.card.session) as task:
+    with nidaqmx.Task(grpc_options=card.session) as task:
         task.ao_channels.add_ao_voltage_chan("Dev1/ao0")
         with pytest.raises(nidaqmx.errors.DaqError) as refused:
             task.write(1.0, auto_start=True)
@@ -163,24 +171,18 @@ def test_the_outcome_of_a_take_over_that_took_too_long_is_told_later(bench, monk
     assert not bench.guardian.tries
 
 
-def test_guardian_of_other_sources_is_refused(bench, monkeypatch):
+def test_guardian_of_other_sources_is_refused(card, monkeypatch):
     changed = {**sources.AT_START, "daqmx/outputs.py": "another"}
     monkeypatch.setattr(sources, "AT_START", changed)
     with pytest.raises(RigError, match=r"other sources than this program .daqmx/outputs\.py in "):
-        Bench(bench.card)
+        Bench(card)
 
 
 @pytest.mark.deep
-def test_guardian_of_another_version_is_refused(bench, monkeypatch):
+def test_guardian_of_another_version_is_refused(card, monkeypatch):
     monkeypatch.setattr(sources, "version", lambda: "0.0.1")
     with pytest.raises(RigError, match=r"other sources than this program .version in "):
-        Bench(bench.card)
-
-
-def test_guardian_says_what_the_system_granted(bench):
-    said = " ".join((*bench.guardian.granted, *bench.guardian.refused))
-    assert "priority" in said
-    assert "locked memory" in said
+        Bench(card)
 
 
 TAKES_OVER = """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -27,6 +28,10 @@ from dearig.model.compiled.jit import jit
 @jit
 def twice(x):
     return 2.0 * x
+
+@jit
+def thrice(x):
+    return 3.0 * x
 """
 RUN = """
 import sys
@@ -34,13 +39,15 @@ sys.path.insert(0, {folder!r})
 from dearig.model.compiled.jit import cache_folder, cache_note
 import kernel
 {before}
-print(kernel.twice(21.0), cache_folder(), cache_note() or "usual", sep="\\n")
+print(kernel.twice(21.0) + kernel.thrice(0.0))
+print(cache_folder(), cache_note() or "usual", sep="\\n")
 """
 
 
 def run(folder: Path, before: str = "", **environment: str) -> list[str]:
     """Value, cache folder and note of a process that compiles or reads the kernel."""
-    (folder / "kernel.py").write_text(KERNEL, encoding="utf-8")
+    if not (folder / "kernel.py").exists():
+        (folder / "kernel.py").write_text(KERNEL, encoding="utf-8")
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA_", "XDG_"))}
     ended = subprocess.run(
         [sys.executable, "-c", RUN.format(folder=str(folder), before=before)],
@@ -48,7 +55,7 @@ def run(folder: Path, before: str = "", **environment: str) -> list[str]:
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr
     value, where, note = ended.stdout.splitlines()
-    assert value == "42.0"
+    assert value == "42.0"  # of both kernels
     return [where, note]
 
 
@@ -66,12 +73,25 @@ def indices(cache: Path) -> list[Path]:
     return [p for p in cache.rglob("*.nbi") if p.name.startswith("kernel.twice")]
 
 
-def test_a_kernel_is_kept_and_found_again(tmp_path: Path) -> None:
-    cache = tmp_path / "cache"
-    where, note = run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the kernels and their ``cache``, which no test changes."""
+    folder = tmp_path_factory.mktemp("filled")
+    cache = folder / "cache"
+    where, note = run(folder, NUMBA_CACHE_DIR=str(cache))
     assert Path(where).parent == cache.resolve()
     assert note == "usual"
-    assert len(indices(cache)) == 1
+    return folder
+
+
+@pytest.fixture
+def cache(filled: Path, tmp_path: Path) -> Path:
+    """A copy of that cache, for a test that runs the kernels in ``filled``."""
+    return Path(shutil.copytree(filled / "cache", tmp_path / "cache"))
+
+
+def test_a_kernel_is_kept_and_found_again(filled: Path) -> None:
+    assert len(indices(filled / "cache")) == 1
 
 
 def test_a_kernel_is_compiled_again_when_a_neighbour_that_it_contains_changes(
@@ -101,14 +121,15 @@ def test_a_kernel_is_compiled_again_when_a_neighbour_that_it_contains_changes(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="modes of this kind are not there on Windows")
-def test_planted_code_in_a_folder_that_others_may_write_to_is_not_run(tmp_path: Path) -> None:
-    cache, mark = tmp_path / "cache", tmp_path / "mark"
-    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+def test_planted_code_in_a_folder_that_others_may_write_to_is_not_run(
+    tmp_path: Path, filled: Path, cache: Path
+) -> None:
+    mark = tmp_path / "mark"
     (index,) = indices(cache)
     index.write_bytes(pickle.dumps(Planted(mark)))
     cache.chmod(0o777)
     (tmp_path / "tmp").mkdir()
-    where, note = run(tmp_path, NUMBA_CACHE_DIR=str(cache), TMPDIR=str(tmp_path / "tmp"))
+    where, note = run(filled, NUMBA_CACHE_DIR=str(cache), TMPDIR=str(tmp_path / "tmp"))
     assert not mark.exists()
     assert not Path(where).is_relative_to(cache)
     assert "everyone may write to" in note
@@ -116,13 +137,14 @@ def test_planted_code_in_a_folder_that_others_may_write_to_is_not_run(tmp_path: 
 
 @pytest.mark.skipif(os.name == "nt", reason="modes of this kind are not there on Windows")
 @pytest.mark.deep
-def test_a_planted_file_in_a_folder_that_was_open_once_is_not_run(tmp_path: Path) -> None:
-    cache, mark = tmp_path / "cache", tmp_path / "mark"
-    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+def test_a_planted_file_in_a_folder_that_was_open_once_is_not_run(
+    tmp_path: Path, filled: Path, cache: Path
+) -> None:
+    mark = tmp_path / "mark"
     (index,) = indices(cache)
     index.write_bytes(pickle.dumps(Planted(mark)))
     index.chmod(0o666)
-    where, note = run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+    where, note = run(filled, NUMBA_CACHE_DIR=str(cache))
     assert not mark.exists()
     assert where.endswith("-private")
     assert index.name in note
@@ -139,17 +161,15 @@ def test_numbas_own_choice_of_folders_is_not_followed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "damage", mostly_deep([b"", b"\x80", b"garbage", b"\x80\x05K\x01.rest"], [b"garbage"])
 )
-def test_a_damaged_cache_is_compiled_again(tmp_path: Path, damage: bytes) -> None:
-    cache = tmp_path / "cache"
-    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+def test_a_damaged_cache_is_compiled_again(filled: Path, cache: Path, damage: bytes) -> None:
+    """The index of one kernel is damaged, and the code of another."""
     (index,) = indices(cache)
+    (data,) = (p for p in cache.rglob("*.nbc") if p.name.startswith("kernel.thrice"))
     whole = index.read_bytes()
     index.write_bytes(damage)
-    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
-    assert index.read_bytes() == whole  # and kept, for the next time
-    (data,) = (p for p in cache.rglob("*.nbc") if p.name.startswith("kernel.twice"))
     data.write_bytes(damage)
-    run(tmp_path, NUMBA_CACHE_DIR=str(cache))
+    run(filled, NUMBA_CACHE_DIR=str(cache))
+    assert index.read_bytes() == whole  # and kept, for the next time
 
 
 @pytest.mark.deep

@@ -112,11 +112,20 @@ def test_nothing_is_missing_in_clean_data_of_the_thesis_network():
     require_nothing(diagnose([record_of(thesis)], thesis, workers=1))
 
 
-def test_nothing_is_missing_in_clean_film_data():
-    found = diagnose([film_record_of(STRIP)], STRIP, workers=1)
+def test_nothing_is_missing_in_clean_film_data_and_progress_rises_from_0_to_1():
+    told = []
+    found = diagnose(
+        [film_record_of(STRIP)], STRIP, workers=1, progress=lambda *step: told.append(step)
+    )  # fmt: skip
     require_consistent(found)
     assert found.verdict == NOTHING_MISSING
     assert found.steps == ()
+    stages, fractions = zip(*told, strict=True)
+    assert fractions[0] == 0.0
+    assert fractions[-1] == 1.0
+    assert all(0.0 <= f <= 1.0 for f in fractions)
+    assert list(fractions) == sorted(fractions)
+    assert all(stages)
 
 
 @pytest.mark.deep
@@ -149,6 +158,24 @@ def test_a_hidden_effect_is_found(name):
     assert found.baseline.cost > 4.0
     assert found.final.cost == pytest.approx(1.0, abs=0.1)
     assert found.unnamed is None
+    assert (found.status, found.interrupted) == ("complete", False)
+    assert found.final.cost < 1.05
+    assert found.final.selection_rms < 1.05 * NOISE
+    values = {e.name: e for e in step.estimates}
+    # at 100 Hz only an alias of the mains is known
+    for number, truth in HIDDEN[name].items():
+        if name != "mains interference":
+            assert values[number].low < truth < values[number].high
+
+
+@pytest.mark.parametrize("name", mostly_deep(HIDDEN, ["load inertia"]))
+def test_the_families_and_the_race_of_a_report(name):
+    found = of_hidden(name)
+    assert sum(dict(found.families).values()) == pytest.approx(1.0)
+    round_ = found.rounds[0]
+    assert round_.chosen == name
+    assert round_.candidates[0].effect == name
+    assert round_.candidates[0].promised > 0.6
 
 
 @pytest.mark.parametrize("name", mostly_deep(HIDDEN, ["load inertia"]))
@@ -381,7 +408,7 @@ def test_masked_readings_do_not_influence_a_diagnosis():
     assert all(one.candidates[0].promised > 0.4 for one in found.rounds if one.chosen in kept)
 
 
-@pytest.mark.parametrize("many", mostly_deep([60, 200], [60]))
+@pytest.mark.parametrize("many", mostly_deep([15, 60, 200], [15]))
 def test_an_interrupted_search_returns_what_it_has_found(many):
     asked = []
 
@@ -424,19 +451,6 @@ def test_a_search_stops_at_its_computing_budget():
     thorough = diagnose([record], PLAIN, workers=1, thorough=True, settings=small)
     assert (thorough.simulations, thorough.final.cost) == (whole.simulations, whole.final.cost)
     assert thorough.notes == whole.notes
-
-
-def test_progress_rises_from_0_to_1():
-    told = []
-    diagnose(
-        [film_record_of(STRIP)], STRIP, workers=1, progress=lambda *step: told.append(step)
-    )  # fmt: skip
-    stages, fractions = zip(*told, strict=True)
-    assert fractions[0] == 0.0
-    assert fractions[-1] == 1.0
-    assert all(0.0 <= f <= 1.0 for f in fractions)
-    assert list(fractions) == sorted(fractions)
-    assert all(stages)
 
 
 @pytest.mark.deep

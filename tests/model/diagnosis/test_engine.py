@@ -19,7 +19,7 @@ from dearig.model.fitting import identify
 from dearig.model.readings.noise import noise_at_rest
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Drive
-from tests.tools.diagnoses import HIDDEN, of_hidden, plant
+from tests.tools.diagnoses import plant
 from tests.tools.engine import (
     PLAIN,
     STRIP,
@@ -29,30 +29,6 @@ from tests.tools.engine import (
     record_of,
     thesis_drive,
 )
-
-
-def test_a_hidden_effect_is_named_with_its_parameters() -> None:
-    found = of_hidden("sensor curvature")
-    assert (found.verdict, found.status) == ("explained", "complete")
-    (step,) = found.steps
-    assert (step.effect, step.family) == ("sensor curvature", "sensor_nonlinearity")
-    (quadratic,) = step.estimates
-    assert quadratic.low < HIDDEN["sensor curvature"]["quadratic"] < quadratic.high
-    assert found.final.cost < 1.05
-    assert found.final.selection_rms < 1.05 * record_of(PLAIN).noise
-
-
-def test_probabilities_of_families_add_up_to_one() -> None:
-    found = dict(of_hidden("sensor curvature").families)
-    assert sum(found.values()) == pytest.approx(1.0)
-    assert found["sensor_nonlinearity"] > 0.9
-
-
-def test_the_race_is_a_round_of_the_report() -> None:
-    (round_,) = of_hidden("sensor curvature").rounds
-    assert round_.chosen == "sensor curvature"
-    assert round_.candidates[0].effect == "sensor curvature"
-    assert round_.candidates[0].promised > 0.6
 
 
 def test_nothing_is_missing_where_nothing_is_hidden() -> None:

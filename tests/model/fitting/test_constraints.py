@@ -16,7 +16,7 @@ from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import FilmRecord
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
-from tests.tools.engine import NOISE, ONE, PLAIN, record_of
+from tests.tools.engine import NOISE, ONE, PLAIN, record_of, thesis_drive
 
 TWO = Network.gent((45e3, 60e3, 40e3), (1e4, 1e4, 1e4), (0.15, 1.2))
 #: Standard errors by which one descent, and two, may miss: they end a tenth of chi-square above.
@@ -26,7 +26,7 @@ LIMITS = (Constraint("J_0", fixed=1e4), Constraint("J_1", fixed=1e4))
 
 @functools.cache
 def record(seed=0):
-    return record_of(PLAIN, seed=seed)
+    return record_of(PLAIN, thesis_drive(rate=50.0), seed=seed)
 
 
 def fit(*constraints, records=None, base=PLAIN, **options):
@@ -213,7 +213,7 @@ def test_p_of_priors_is_uniform_where_they_are_true():
 
 
 def test_prior_settles_what_the_data_leave_open():
-    short = record_of(PLAIN, seed=3)
+    short = record(3)
     alone = identify([short], Actuator(THESIS_FILM, THESIS_LOAD, TWO))
     stated = [
         Constraint("T_1", mean=0.4, sd=0.01),
@@ -231,7 +231,8 @@ def test_prior_settles_what_the_data_leave_open():
 def test_branch_of_which_something_is_stated_keeps_its_number():
     truth = Actuator(THESIS_FILM, THESIS_LOAD, TWO)
     for stated in ([Constraint("T_1", fixed=1.2)], [Constraint("T_1", low=0.8, high=2.0)]):
-        found = identify([record_of(truth)], truth, intervals=False, constraints=stated)
+        made = record_of(truth, thesis_drive(rate=50.0))
+        found = identify([made], truth, intervals=False, constraints=stated)
         assert found.cost == pytest.approx(1.0, abs=0.1)
         assert found.model.network.times[0] == pytest.approx(1.2, rel=0.05)
         assert found.model.network.times[1] == pytest.approx(0.15, rel=0.05)

@@ -73,7 +73,7 @@ def test_no_interval_is_narrower_than_with_all_others_known() -> None:
     first, *rest = PLAIN.network.branches
     half = replace(first, spring=replace(first.spring, modulus=0.5 * first.spring.modulus))
     twins = replace(PLAIN, network=replace(PLAIN.network, branches=(half, half, *rest)))
-    problem, x, free = posed(twins, record_of(PLAIN, thesis_drive(rate=100.0)))
+    problem, x, free = posed(twins, record_of(PLAIN, thesis_drive(rate=50.0)))
     found = descend(problem, x, ~free)
     estimates = estimates_with_intervals(
         problem, problem.layout.values(found.x), ~free, lambda _: None, lower_ends=False
@@ -87,7 +87,7 @@ def test_no_interval_is_narrower_than_with_all_others_known() -> None:
 
 
 def test_profiles_end_when_they_are_asked_to() -> None:
-    problem, x, free = posed(PLAIN, record_of(PLAIN, thesis_drive(rate=100.0)))
+    problem, x, free = posed(PLAIN, record_of(PLAIN, thesis_drive(rate=50.0)))
     found = descend(problem, x, ~free)
     values = problem.layout.values(found.x)
     points: list[float] = []
@@ -110,7 +110,7 @@ def test_profiles_end_when_they_are_asked_to() -> None:
 
 
 def test_a_value_off_the_optimum_is_no_end_of_its_own_interval() -> None:
-    problem, x, free = posed(PLAIN, record_of(PLAIN, thesis_drive(rate=100.0)))
+    problem, x, free = posed(PLAIN, record_of(PLAIN, thesis_drive(rate=50.0)))
     off = problem.layout.values(descend(problem, x, ~free).x)
     off[problem.layout.names.index("mu_1")] *= 1.01
     with pytest.raises(BetterPoint) as better:
@@ -126,7 +126,7 @@ def test_a_value_off_the_optimum_is_no_end_of_its_own_interval() -> None:
 
 @pytest.mark.parametrize("changed", ["mu_0", "T_1"])
 def test_intervals_take_the_model_to_its_optimum(changed: str) -> None:
-    record = record_of(PLAIN, thesis_drive(rate=100.0))
+    record = record_of(PLAIN, thesis_drive(rate=50.0))
     fit = identify([record], PLAIN)
     branch = PLAIN.network.branches[0]
     network = fit.model.network

@@ -23,9 +23,10 @@ def _elsewhere() -> ActuatorRecord:
 def test_it_is_the_spread_of_predictions_by_fits_to_many_noises() -> None:
     record, off = _elsewhere(), []
     for seed in range(12):
-        fitted = identify([record_of(PLAIN, seed=seed)], PLAIN, intervals=False, workers=1)
+        noisy = record_of(PLAIN, thesis_drive(rate=50.0), seed=seed)
+        fitted = identify([noisy], PLAIN, intervals=False, workers=1)
         off.append(fitted.model.simulate(record.drive).displacement - record.displacement)
-    one = identify([record_of(PLAIN, seed=20)], PLAIN, workers=1)
+    one = identify([record_of(PLAIN, thesis_drive(rate=50.0), seed=20)], PLAIN, workers=1)
     record = replace(record, noise=1e-6)
     bound = prediction_error(record, one.model, one.covariance_names, one.covariance)
     spread = NORMAL_95 * float(np.sqrt(np.mean(np.square(off))))

@@ -73,7 +73,7 @@ def test_normal_noise_has_no_heavy_tails():
     rng = np.random.default_rng(1)
     for step in (0.0, 1.2):
         found = []
-        for _ in range(20):
+        for _ in range(8):
             values = rng.standard_normal(400)
             found.append(tails_of(step * np.round(values / step) if step else values, step))
         assert all(tails.is_normal for tails in found)
@@ -83,11 +83,11 @@ def test_normal_noise_has_no_heavy_tails():
 @pytest.mark.parametrize("step", [0.0, 1.0])
 def test_heavy_tails_are_found_with_their_scale(step):
     rng = np.random.default_rng(2)
-    values = rng.standard_t(4.0, (20, 400))
+    values = rng.standard_t(4.0, (10, 400))
     found = [tails_of(step * np.round(v / step) if step else v, step) for v in values]
     heavy = [tails for tails in found if not tails.is_normal]
     # of 400 readings that are rounded to their scale, a few do not show it
-    assert len(heavy) >= 17
+    assert len(heavy) >= 8
     assert np.median([tails.freedom for tails in heavy]) == pytest.approx(4.0, abs=1.0)
     assert np.median([tails.scale for tails in heavy]) == pytest.approx(1.0, rel=0.1)
 

@@ -53,11 +53,12 @@ def run(path: Path, steps: dict[int, float], clock_rate: float = 1.0) -> Verific
     """A run of 30 s, with the computer's clock set by ``steps`` (s) after some of its seconds."""
     clock = Clock()
     identity = replace(IDENTITY, simulated=False)
-    with writer(path, identity=identity, samples_expected=30_000, now=clock) as recorder:
-        counts = run_counts(30_000)
+    run = {"rate_Hz": 100.0, "samples_expected": 3000, "now": clock}
+    with writer(path, identity=identity, **run) as recorder:
+        counts = run_counts(3000)
         for i in range(30):
             clock.moment += clock_rate + steps.get(i, 0.0)
-            recorder.append(Block(1000 * i, counts[:, 1000 * i : 1000 * i + 1000]))
+            recorder.append(Block(100 * i, counts[:, 100 * i : 100 * i + 100]))
     return verify(path)
 
 
@@ -67,7 +68,7 @@ def test_a_clock_that_is_set_forward_is_a_note(tmp_path: Path, step: float) -> N
     assert found.faults == []
     assert found.notes == [
         f"the computer's clock was set forward by {step:.4g} s during the run, or the computer "
-        f"slept, at sample 14000 (14 s); the sample clock is not affected"
+        f"slept, at sample 1400 (14 s); the sample clock is not affected"
     ]
 
 

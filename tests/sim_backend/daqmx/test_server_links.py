@@ -62,7 +62,7 @@ def heard():
 def victim(port: int, how: str):
     """A client in a process of its own that has put 5 V on the output."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.tools.daqmx", str(port), how],
+        [sys.executable, "-m", "tests.tools.daqmx_client", str(port), how],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
