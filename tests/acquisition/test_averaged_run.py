@@ -34,7 +34,7 @@ from tests.tools.daqmx import Served, served
 
 LOADED = parse_sequence(LOBE, "lobe", Path())
 N = 20
-ROW_RATE = 500.0
+ROW_RATE = 200.0
 QUICK = {"first_convert_us": 2.0, "convert_interval_us": 2.0}
 FAST = RigFile(card=CardSettings(sample_rate_Hz=N * ROW_RATE, **QUICK))
 AVERAGED = RigFile(card=CardSettings(sample_rate_Hz=ROW_RATE, average=N, **QUICK))

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from dearig.config.campaignfile import EXAMPLE, Campaign, load_campaign, parse_campaign
 from dearig.errors import InputError
+from tests.deep import examples
 from tests.tools.command import LOBE, write
 
 HEAD = 'name = "ageing"\nsequence = "thesis"\n'
@@ -40,6 +41,7 @@ settings = st.dictionaries(
 )
 
 
+@examples(100, suite=30)
 @given(
     grid=settings,
     listed=st.lists(st.integers(1, 3), max_size=3),

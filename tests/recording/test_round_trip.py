@@ -107,7 +107,7 @@ def there_and_back(
 
 
 @pytest.mark.parametrize("to", EXPORTS)
-@examples(25, 8)
+@examples(25, 5)
 @given(
     values=st.one_of(actuators(), films()),
     events=EVENTS,

@@ -131,7 +131,7 @@ def _rates(y, t, drive, head, springs):
     return dy
 
 
-def solve(actuator, time, voltage, hold=False, tolerance=1e-11):
+def solve(actuator, time, voltage, hold=False, tolerance=1e-10):
     """Solve for the stretch (N,) at ``time`` under ``voltage``, by LSODA from sample to sample.
 
     Every sample is a corner of the drive, so the solver restarts at each. Branches of relaxation
@@ -164,7 +164,7 @@ def solve(actuator, time, voltage, hold=False, tolerance=1e-11):
         ends = (time[k], time[k + 1])
         drive = np.array([ends[0], ends[1] - ends[0], voltage[k], voltage[k + (not hold)]])
         y = odeint(
-            _rates, y, ends, args=(drive, head, springs), rtol=tolerance, atol=1e-13, mxstep=200_000
+            _rates, y, ends, args=(drive, head, springs), rtol=tolerance, atol=1e-12, mxstep=200_000
         )[1]
         out.append(y[0])
     return np.array(out)

@@ -80,6 +80,7 @@ class Course:
     def moisture(self, t):
         return 0.02 * t
 
+    @functools.cache  # noqa: B019  (there is one course)
     def drive(self, rate, finer=1):
         """Sampled at ``rate``, or straight between these samples in ``finer`` steps."""
         time = np.arange(round(self.end * rate) + 1) / rate

@@ -22,7 +22,7 @@ def _elsewhere() -> ActuatorRecord:
 
 def test_it_is_the_spread_of_predictions_by_fits_to_many_noises() -> None:
     record, off = _elsewhere(), []
-    for seed in range(12):
+    for seed in range(8):
         noisy = record_of(PLAIN, thesis_drive(rate=50.0), seed=seed)
         fitted = identify([noisy], PLAIN, intervals=False, workers=1)
         off.append(fitted.model.simulate(record.drive).displacement - record.displacement)
@@ -30,7 +30,7 @@ def test_it_is_the_spread_of_predictions_by_fits_to_many_noises() -> None:
     record = replace(record, noise=1e-6)
     bound = prediction_error(record, one.model, one.covariance_names, one.covariance)
     spread = NORMAL_95 * float(np.sqrt(np.mean(np.square(off))))
-    # twelve fits of three parameters know a standard deviation to some 1/sqrt(2 * 36)
+    # eight fits of three parameters know a standard deviation to some 1/sqrt(2 * 24)
     assert bound == pytest.approx(spread, rel=0.4)
 
 

@@ -130,7 +130,7 @@ def test_runs_ask_for_too_few_changes_of_sign_only():
 
 
 def test_what_is_called_noise_is_denied_by_no_test():
-    for seed in range(20):
+    for seed in range(10):
         for along in (0.0, 0.03, 0.1, 0.3):
             s = look(correlated(seed, along))
             # one of three tests, of which the least counts three times
@@ -138,7 +138,7 @@ def test_what_is_called_noise_is_denied_by_no_test():
             assert not (s.is_noise and least < REJECTED_BELOW / 3.0)
             assert s.noise_p is not None
             assert s.is_noise or s.noise_p < REJECTED_BELOW or s.rms > NOISE
-    assert not any(look(correlated(seed, 0.3)).is_noise for seed in range(20))
+    assert not any(look(correlated(seed, 0.3)).is_noise for seed in range(10))
 
 
 def test_noise_as_coloured_as_the_readings_at_rest_is_noise():

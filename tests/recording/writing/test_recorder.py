@@ -159,11 +159,11 @@ def test_missing_samples_are_a_fault(tmp_path: Path) -> None:
 
 def test_a_rig_without_a_clock_waits_for_the_disk(tmp_path: Path) -> None:
     recorder = Recorder(writer(tmp_path / "run.h5"), waits=True)
-    for block in blocks(60.0):
+    for block in blocks(HOLDS + 5.0):
         recorder.append(block)
     assert recorder.fault is None
     recorder.close("finished")
-    assert open_recording(tmp_path / "run.h5").samples == 60_000
+    assert open_recording(tmp_path / "run.h5").samples == (HOLDS + 5.0) * RATE
 
 
 def test_it_does_not_wait_for_a_disk_that_stands_still(

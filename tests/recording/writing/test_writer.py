@@ -381,7 +381,7 @@ def test_flushes_are_due_four_times_a_second() -> None:
 
 
 def test_a_finished_run_takes_at_most_twice_the_bytes_of_its_counts(tmp_path: Path) -> None:
-    counts = run_counts(200_000)
+    counts = run_counts(60_000)
     write(tmp_path / "run.h5", counts, block=10_000)
     assert (tmp_path / "run.h5").stat().st_size <= 2 * counts.nbytes
 

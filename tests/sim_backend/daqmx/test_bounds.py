@@ -19,6 +19,7 @@ import nidaqmx
 import numpy as np
 import pytest
 from google.protobuf.descriptor import FieldDescriptor
+from nidaqmx import GrpcSessionOptions
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 from nidaqmx.constants import TaskMode
 from nidaqmx.errors import DaqError, RpcError
@@ -339,7 +340,9 @@ def test_nothing_that_a_client_does_writes_a_traceback_to_the_terminal(tmp_path:
     )  # fmt: skip
     try:
         assert process.stdout is not None
-        port = int(re.findall(r":(\d+);", process.stdout.readline())[0])
+        line = process.stdout.readline()
+        assert "--rig daqmx:Dev1@127.0.0.1:" in line
+        port = int(re.findall(r":(\d+);", line)[0])
         for data in (b"\x00" * 1000, _PREFACE, b""):
             with socket.create_connection(("127.0.0.1", port)) as plain:
                 plain.sendall(data)
@@ -349,12 +352,14 @@ def test_nothing_that_a_client_does_writes_a_traceback_to_the_terminal(tmp_path:
             *((there / name).read_bytes() for name in ("ca.pem", "client.key", "client.pem"))
         )
         with grpc.secure_channel(f"127.0.0.1:{port}", credentials) as channel:
+            device = Device("Dev1", grpc_options=GrpcSessionOptions(channel, ""))
+            assert device.product_type == "PCIe-6361"
             for name, data in (
                 ("CfgHandshakingTiming", b""), ("CreateTask", b"\xff" * 9), ("ReadRaw", b""),
                 ("RegisterDoneEvent", b""), ("WriteRaw", b"\x0a\x02\x0a\x00"), ("NoSuchCall", b""),
             ):  # fmt: skip
                 assert _outcome(channel, name, data)[0] is not grpc.StatusCode.OK
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGTERM)
         _, said = process.communicate(timeout=60.0)
     finally:
         process.kill()

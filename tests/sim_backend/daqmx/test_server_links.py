@@ -364,7 +364,7 @@ def command(*arguments: str):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals there")
-@pytest.mark.parametrize("number", mostly_deep([signal.SIGINT, signal.SIGTERM], [signal.SIGTERM]))
+@pytest.mark.parametrize("number", mostly_deep([signal.SIGINT, signal.SIGTERM], []))
 def test_the_command_says_where_it_is_and_ends_when_told(number):
     with command("--fast", "--rig", "sim:3") as process:
         line = process.stdout.readline()

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import odeint
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
@@ -142,7 +142,7 @@ def test_an_electrode_passes_the_current_of_its_own_circuit(form):
     for k, v in enumerate(voltage[:-1]):
         charges[0, k], currents[0, k] = q.sum(), sum(slope(time[k], q, v))
         span = (time[k], time[k + 1])
-        q = solve_ivp(slope, span, q, "LSODA", args=(v,), rtol=1e-8, atol=1e-15).y[:, -1]
+        q = odeint(slope, q, span, args=(v,), tfirst=True, rtol=1e-8, atol=1e-15)[1]
         charges[1, k], currents[1, k] = q.sum(), sum(slope(time[k + 1], q, v))
     np.testing.assert_allclose(found.charge, charges, atol=1e-5 * charges.max())
     np.testing.assert_allclose(found.charging, currents, atol=1e-4 * np.abs(currents).max())
