@@ -111,7 +111,8 @@ def _import_commands() -> None:
         "dearig.recording.importers.formats.tdms_file",
         "dearig.recording.importers.formats.text_file",
         "dearig.recording.verify", "dearig.report.as_json", "dearig.report.pages.diagnosis",
-        "dearig.report.pages.html", "openpyxl", "pyqtgraph", "rich.progress", "rich.table",
+        "dearig.report.pages.html", "dearig.window.main", "openpyxl", "pyqtgraph", "rich.progress",
+        "rich.table",
     ):  # fmt: skip
         importlib.import_module(name)
     import typer.main

@@ -269,8 +269,10 @@ UNITS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("command", ["diagnose {f}", "identify {f} --out {d}/m.toml"])
-@pytest.mark.parametrize("case", UNITS)
+@pytest.mark.parametrize(
+    ("case", "command"),
+    [*((case, "diagnose {f}") for case in UNITS), ("no voltage", "identify {f} --out {d}/m.toml")],
+)
 def test_what_cannot_be_meant_is_refused_in_words(tmp_path, case, command):
     values, words = UNITS[case]
     path = tmp_path / "run.h5"
