@@ -53,9 +53,8 @@ def soften(c, k, m, j, lam, since, t, warmth):
 
 def test_an_effect_of_another_distribution_is_found_and_used(tmp_path):
     add_distribution(tmp_path, "lab-effects", {"lab_drag": made_effect("lab drag")})
-    found, problems, *_ = run_with(tmp_path, FOUND).split("\n")
+    found, problems, added, effects = run_with(tmp_path, FOUND + USED).splitlines()
     assert (found, problems) == ("['lab drag: lab-effects 1.0']", "")
-    added, effects = run_with(tmp_path, USED).splitlines()
     assert added == "[0.0, 250.0, 250.0, 250.0, 250.0]"
     assert effects == "(('lab drag', (('drag', 250.0),)),)"
 
