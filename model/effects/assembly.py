@@ -56,8 +56,8 @@ _COMBINE = MappingProxyType(
         "product": ("total = 1.0", "total *= {}", "total"),
     }
 )
-# Hooks of a few operations that each stage of a step calls: a call would take longer than they do.
-_INTO_CALLERS = ("supply", "polarise", "permittivity", "soften")
+# Hooks that each stage of a step calls: of a short law the call would take most of the time.
+_INTO_CALLERS = ("supply", "polarise", "permittivity", "soften", "stress")
 # Types of what a hook returns, by the number of its values, and of on, c, m.
 _RETURNED = ("int64", "float64", "UniTuple(float64, 2)")
 _VECTOR = "float64[::1]"
