@@ -86,6 +86,12 @@ def _old_objects_are_not_searched() -> None:
 
 
 @pytest.fixture(autouse=True)
+def _no_style_sheet_of_an_earlier_window(qapp: QApplication) -> None:
+    """As at the start of the program: with a sheet, Qt restyles each part that is put in place."""
+    qapp.setStyleSheet("")
+
+
+@pytest.fixture(autouse=True)
 def _garbage_is_collected_here(qapp: QApplication) -> Iterator[None]:
     """As in the program: never in another thread, where a widget must not be destroyed."""
     gc.disable()
