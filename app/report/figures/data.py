@@ -99,22 +99,26 @@ def _bars(ax: Axes) -> Iterator[Column]:
     """Yield two columns for each group of bars: their places or names, and their lengths."""
     from matplotlib.container import BarContainer
 
-    names = [label.get_text() for label in ax.get_yticklabels()]
-    places = [float(place) for place in ax.get_yticks()]
     for group in ax.containers:
         if not isinstance(group, BarContainer):
             continue
         bars = group.patches
         name = _public(group.get_label())
         if group.orientation == "horizontal":
-            middle = [bar.get_y() + bar.get_height() / 2.0 for bar in bars]
-            nearest = [min(range(len(places)), key=lambda i: abs(places[i] - m)) for m in middle]
-            yield "", [names[i] for i in nearest]
+            yield "", _names_at(ax, [bar.get_y() + bar.get_height() / 2.0 for bar in bars])
             yield _named(_x_label(ax), name), [bar.get_width() for bar in bars]
         else:
             yield _named(_x_label(ax), "from"), [bar.get_x() for bar in bars]
             yield _named(_x_label(ax), "to"), [bar.get_x() + bar.get_width() for bar in bars]
             yield _named(_y_label(ax), name), [bar.get_height() for bar in bars]
+
+
+def _names_at(ax: Axes, places: Sequence[float]) -> list[str]:
+    """Return the label of the tick of the y axis that is nearest to each of ``places``."""
+    ticks = [float(tick) for tick in ax.get_yticks()]
+    names = [label.get_text() for label in ax.get_yticklabels()]
+    nearest = [min(range(len(ticks)), key=lambda i: abs(ticks[i] - place)) for place in places]
+    return [names[i] for i in nearest]
 
 
 def _public(label: object) -> str:

@@ -56,9 +56,12 @@ def svg(figure: Figure, prefix: str, label: str) -> str:
     ``prefix`` separates its identifiers from those of other figures; ``label`` describes it for
     screen readers. It has no fixed size, uses the font of the page, and refers to no other file.
     """
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     stream = io.StringIO()
     with style():
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        # savefig would draw all of it once more beforehand, for the layout alone
+        FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
