@@ -96,11 +96,15 @@ class Flow(QLayout):
 
     def _lines(self, width: int) -> list[list[tuple[QLayoutItem, int]]]:
         lines: list[list[tuple[QLayoutItem, int]]] = []
+        used = 0
         for pair in self._shown():
-            if lines and self._width([*lines[-1], pair]) <= width:
+            wanted = _wanted(pair[0])
+            if lines and used + self.spacing() + wanted <= width:
                 lines[-1].append(pair)
+                used += self.spacing() + wanted
             else:
                 lines.append([pair])
+                used = wanted
         return lines
 
     def _width(self, line: list[tuple[QLayoutItem, int]]) -> int:
