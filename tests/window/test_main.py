@@ -86,15 +86,26 @@ def test_a_rig_file_that_is_none_is_told_in_the_terminal(tmp_path: Path) -> None
     assert "film.length_mm = -1.0 is not allowed" in done.stderr
 
 
-# arms and starts a run as soon as there is a plan, and raises the signal half a second into it
+# arms and starts a run as soon as there is a plan, and raises the signal in its lobe of five seconds
 RUN = """\
 import signal
+from pathlib import Path
 from PySide6.QtCore import QTimer
 import dearig.window.main as main
 from dearig.window.shell.frame import MainWindow
 shown = MainWindow.show
+LOBE = '''
+name = "one lobe"
+lead_in_s = 0.3
+[[segment]]
+kind = "half_sine"
+amplitude_kV = 6.0
+frequency_Hz = 0.1
+'''
 def show(self):
     shown(self)
+    self.idle_pages.close()  # all pages would be made before the rig is armed
+    self.session.set_sequence(LOBE, Path())
     page, timer = self.run_page, QTimer(self)
     def look():
         if page.live is None:
@@ -102,7 +113,7 @@ def show(self):
                 page.start_button.click()  # once ARMED was seen
             elif page.arm_button.isEnabled():
                 page.arm_button.click()
-        elif (now := page.live.now()) is not None and now.samples > 2500:
+        elif (now := page.live.now()) is not None and now.samples > 1000:
             timer.stop()
             signal.raise_signal(signal.SIGTERM)
     timer.timeout.connect(look)
