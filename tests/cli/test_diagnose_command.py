@@ -40,6 +40,12 @@ from tests.tools.reports import ESTIMATES
 RIG = "[card]\nsample_rate_Hz = 50.0\n"
 #: What the simulated rig of these tests hides.
 HIDDEN = replace(PLAIN, effects=effect("amplifier offset", offset=60.0))
+#: What a search has found: an effect that nothing rivals, for which no experiment is searched, and
+#: one that has a rival.
+NAMED = finding(rivals=())
+OPEN = finding(
+    final=stage(LAGGED, 1e-6, estimates=ESTIMATES), rivals=(("amplifier", RIVAL),), steps=(STEP,)
+)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -225,7 +231,7 @@ class TestOutputs:
             assert not stop()
             signal.raise_signal(signal.SIGINT)
             assert stop()
-            return finding(interrupted=True)
+            return finding(rivals=(), interrupted=True)
 
         monkeypatch.setattr(app_diagnose, "diagnose", search)
         answer = dearig(
@@ -245,7 +251,7 @@ class TestOutputs:
 
         def search(records, base, *, progress, stop, thorough, others, constraints):
             asked.append(thorough)
-            return finding()
+            return NAMED
 
         monkeypatch.setattr(app_diagnose, "diagnose", search)
         done("diagnose", bench / "thesis.h5", *words, "--json", "-")
@@ -265,7 +271,7 @@ class TestOutputs:
     def test_a_recording_that_the_model_cannot_follow_loses_nothing(self, bench, monkeypatch):
         # it cannot carry the load
         broken = replace(HIDDEN, network=Network(Spring(0.0)), effects=())
-        instead(monkeypatch, finding(baseline=stage(broken, 2e-6)))
+        instead(monkeypatch, finding(baseline=stage(broken, 2e-6), rivals=()))
         found = done(
             "diagnose", bench / "thesis.h5", "--validate", bench / "validation-a-0.6.h5",
             "--json", "-",
@@ -273,12 +279,6 @@ class TestOutputs:
         assert found["baseline"]["validation"] is None
         assert found["final"]["validation"]["rms_um"] > 0.0
         assert "left out of the validation errors" in " ".join(found["quality"])
-
-
-NAMED = finding(rivals=())
-OPEN = finding(
-    final=stage(LAGGED, 1e-6, estimates=ESTIMATES), rivals=(("amplifier", RIVAL),), steps=(STEP,)
-)
 
 
 class TestRig:

@@ -86,8 +86,8 @@ class Story:
         until(lambda: not self.runner.running, "the end of the run")
         return self.page.controls.time_left.text()
 
-    def on_screen(self, widget: QWidget, name: str) -> str:
-        """Colour of a corner of ``widget`` on the screen; the picture is kept as ``name``."""
+    def on_screen(self, widget: QWidget) -> str:
+        """Colour of a corner of ``widget`` on the screen."""
         screen = self.application.primaryScreen().grabWindow(0).toImage()
         return str(screen.pixelColor(pixel(widget, QPoint(12, 10))).name())
 
@@ -105,7 +105,7 @@ def on_a_simulated_rig(story: Story) -> None:
     for other in window.pages:
         window.show_page(other)
         until(other.isVisible, "the page")
-        colours.add(story.on_screen(bar.stop_button, f"page-{window.pages.index(other)}"))
+        colours.add(story.on_screen(bar.stop_button))
     saw["stop on every page"] = sorted(colours)
 
     disarmed = []
@@ -164,7 +164,6 @@ def beside_dialog(story: Story) -> list[str]:
             QTimer.singleShot(50, during)
             return
         saw.append("modal" if opened.isModal() else "not modal")
-        story.on_screen(window.bar.stop_button, "dialog")
         story.click(window.bar.stop_button)
         look(opened)
 
@@ -196,7 +195,6 @@ def on_a_card(story: Story, port: int) -> None:
     saw["detail"] = bar.detail.text()
     saw["alarm"] = bar.alarm.full_text
     saw["time"] = bar.time.text()
-    story.on_screen(bar.stop_button, "card")
 
     released = Released()
     story.application.installEventFilter(released)

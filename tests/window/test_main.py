@@ -86,7 +86,7 @@ def test_a_rig_file_that_is_none_is_told_in_the_terminal(tmp_path: Path) -> None
     assert "film.length_mm = -1.0 is not allowed" in done.stderr
 
 
-# arms and starts a run as soon as there is a plan, and raises the signal in its lobe of five seconds
+# arms and starts a run as soon as there is a plan, and raises the signal in its lobe of 5 s
 RUN = """\
 import signal
 from pathlib import Path
