@@ -25,6 +25,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
+from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import LimitsSettings
 from dearig.window.campaign.page import CampaignPage
@@ -42,6 +43,8 @@ _ALLOWED = (
     "This plugin does not support raise()",
     "This plugin does not support grabbing the keyboard",
 )
+
+SHARED = "shared"  #: property of a window that further tests use
 
 SHORT = """\
 name = "one lobe"
@@ -71,7 +74,8 @@ def pytest_runtest_teardown() -> Generator[None]:
     """
     for widget in QApplication.topLevelWidgets() if QApplication.instance() else ():
         if isinstance(widget, MainWindow):
-            widget.leave()
+            if not widget.property(SHARED):
+                widget.leave()
             end_run(widget.run_page.runner)
         elif isinstance(widget, RunPage):
             end_run(widget.runner)
@@ -88,7 +92,8 @@ def _old_objects_are_not_searched() -> None:
 @pytest.fixture(autouse=True)
 def _no_style_sheet_of_an_earlier_window(qapp: QApplication) -> None:
     """As at the start of the program: with a sheet, Qt restyles each part that is put in place."""
-    qapp.setStyleSheet("")
+    if not any(isinstance(widget, MainWindow) for widget in qapp.topLevelWidgets()):
+        qapp.setStyleSheet("")
 
 
 @pytest.fixture(autouse=True)
@@ -99,6 +104,7 @@ def _garbage_is_collected_here(qapp: QApplication) -> Iterator[None]:
     # what was closed is deleted before the next test, and in this thread
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
     gc.collect()
+    gc.freeze()  # what is left is not searched again after each further test
     gc.enable()
 
 
@@ -152,13 +158,18 @@ def answers(monkeypatch: pytest.MonkeyPatch) -> Answers:
     return given
 
 
-@pytest.fixture
-def session(tmp_path: Path, qapp: QApplication) -> Session:
+def new_session(parent: Path) -> Session:
+    """Return a session with settings and a folder of recordings in ``parent``."""
     prepare_plots()
-    settings = QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
-    folder = tmp_path / "recordings"
+    settings = QSettings(str(parent / "settings.ini"), QSettings.Format.IniFormat)
+    folder = parent / "recordings"
     folder.mkdir()
     return Session(folder, settings, theme=LIGHT)
+
+
+@pytest.fixture
+def session(tmp_path: Path, qapp: QApplication) -> Session:
+    return new_session(tmp_path)
 
 
 @pytest.fixture
@@ -208,6 +219,46 @@ def window(
     qtbot.waitUntil(lambda: session.preview is not None, timeout=120_000)
     shown.run_page.paced.setChecked(False)
     return shown
+
+
+@pytest.fixture(scope="module")
+def shared_window(
+    qapp: QApplication, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[MainWindow]:
+    """A window as ``window``, for all tests of a file that leave no trace; see ``put_back``."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(CampaignPage, "at_start", False)
+        shown = MainWindow(new_session(tmp_path_factory.mktemp("shared")))
+    shown.setProperty(SHARED, True)
+    shown.idle_pages.close()
+    shown.resize(1366, 768)
+    shown.show()
+    shown.activateWindow()
+    assert QTest.qWaitForWindowActive(shown)
+    yield shown
+    shown.leave()
+    shown.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+
+
+def put_back(window: MainWindow, qtbot: QtBot) -> MainWindow:
+    """Return ``window`` disarmed, with the rig, the sequence and the page of the first start."""
+    session, page = window.session, window.run_page
+    end_run(page.runner)
+    page.stop()  # which disarms
+    assert not page.runner.armed
+    assert session.blocks == {}
+    window.activateWindow()
+    window.show_page(page)
+    page.paced.setChecked(False)
+    page.operator.setText("")
+    session.set_rig_file(None, "", RigFile())
+    session.set_sequence(PRESETS["thesis"], Path())
+    qtbot.waitUntil(
+        lambda: session.preview is not None and session.preview.toml == PRESETS["thesis"],
+        timeout=120_000,
+    )
+    return window
 
 
 @pytest.fixture

@@ -12,11 +12,23 @@ from pytestqt.qtbot import QtBot
 
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.high_voltage.status import REACTION
+from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from tests.deep import mostly_deep
-from tests.window.conftest import press
+from tests.window.conftest import press, put_back
 
 LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def window(shared_window: MainWindow, qtbot: QtBot) -> MainWindow:
+    """The window of this file: what is pressed leaves no trace in it once it is disarmed."""
+    return put_back(shared_window, qtbot)
+
+
+@pytest.fixture
+def session(window: MainWindow) -> Session:
+    return window.session
 
 
 def busy(seconds: float) -> None:

@@ -18,11 +18,22 @@ from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from dearig.window.study.page import StudyPage
-from tests.window.conftest import SHORT, press, strike
+from tests.window.conftest import SHORT, press, put_back, strike
 
 LEFT = Qt.MouseButton.LeftButton
 KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Space)
 RUN_MS = 60_000
+
+
+@pytest.fixture
+def window(shared_window: MainWindow, qtbot: QtBot) -> MainWindow:
+    """The window of this file: what is pressed leaves no trace in it once it is disarmed."""
+    return put_back(shared_window, qtbot)
+
+
+@pytest.fixture
+def session(window: MainWindow) -> Session:
+    return window.session
 
 
 def places(window: MainWindow) -> list[QWidget]:
@@ -157,6 +168,7 @@ def test_a_space_does_not_write_where_nothing_can_be_written(
     typed.setCommitString(" ")
     QApplication.sendEvent(QApplication.focusObject(), typed)
     assert not page.runner.armed
+    page.operator.setReadOnly(False)
 
 
 def test_esc_closes_what_is_open_before_it_stops(
