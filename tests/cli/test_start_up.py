@@ -2,74 +2,90 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "recordings" / "sample-plain.h5"
 
-#: Runs the command with packages that cannot be imported: the first argument names them.
+#: Runs commands one after another with packages that cannot be imported: the first argument names
+#: them, the second has the commands. A form feed stands after the texts of each.
 WITHOUT = """
-import sys
+import json, sys
 
 class Refuse:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in refused:
             raise RuntimeError(f"{name} is imported")
 
-refused = sys.argv.pop(1).split(",")
+refused, commands = sys.argv[1].split(","), json.loads(sys.argv[2])
 sys.meta_path.insert(0, Refuse())
 from dearig.cli.main import main
-main()
+for words in commands:
+    sys.argv = ["dearig", *words]
+    try:
+        main()
+        code = 0
+    except SystemExit as end:
+        code = end.code
+    print(code, end="\\f", flush=True)
+    print(end="\\f", file=sys.stderr, flush=True)
 """
 SOLVERS = "scipy,numba,matplotlib,pyarrow,PySide6,nidaqmx"
 
 
-def run(refused: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+def start(refused: str, *commands: list[str]) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", WITHOUT, refused, *arguments],
+        [sys.executable, "-c", WITHOUT, refused, json.dumps(commands)],
         capture_output=True, text=True, encoding="utf-8", check=False, timeout=200,
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--version"], ["--help"], ["record", "-h"], ["doctor", "-h"]]
-)
-def test_help_and_version_import_nothing_heavy(arguments: list[str]) -> None:
-    ended = run(f"{SOLVERS},numpy,h5py", *arguments)
-    assert ended.stderr == ""
-    assert ended.returncode == 0
-    assert "dearig" in ended.stdout
+def run(refused: str, *commands: list[str]) -> list[tuple[str, str]]:
+    """Return what each of ``commands`` wrote to its two streams, with its code after the first."""
+    ended = start(refused, *commands)
+    assert ended.returncode == 0, ended.stderr
+    told = zip(ended.stdout.split("\f")[:-1], ended.stderr.split("\f")[:-1], strict=True)
+    answers = list(told)
+    assert len(answers) == len(commands)
+    return answers
 
 
-@pytest.mark.parametrize("arguments", [["info"], ["info", "--json", "-"], ["info", "--verify"]])
-def test_info_needs_no_solver(arguments: list[str]) -> None:
-    ended = run(SOLVERS, *arguments, str(SAMPLE))
-    assert ended.stderr == ""
-    assert ended.returncode == 0
-    assert "5168" in ended.stdout or "every check passed" in ended.stdout
+def test_help_and_version_import_nothing_heavy() -> None:
+    commands = [["--version"], ["--help"], ["record", "-h"], ["doctor", "-h"]]
+    for words, (out, err) in zip(commands, run(f"{SOLVERS},numpy,h5py", *commands), strict=True):
+        assert err == "", words
+        assert out.endswith("\n0"), words
+        assert "dearig" in out, words
 
 
-def test_watching_needs_no_solver() -> None:
+def test_reading_watching_and_exporting_need_no_solver(tmp_path: Path) -> None:
     """A watcher stands on the computer that runs the rig."""
-    ended = run(SOLVERS, "watch", str(SAMPLE), "--once")
-    assert ended.stderr == ""
-    assert "sample-plain.h5" in ended.stdout
-
-
-def test_export_to_csv_needs_no_solver(tmp_path: Path) -> None:
-    out = tmp_path / "out.csv"
-    ended = run(SOLVERS, "export", str(SAMPLE), "--to", "csv", "--out", str(out))
-    assert ended.stderr == ""
-    assert len(out.read_text(encoding="utf-8").splitlines()) == 5169
+    sample, csv = str(SAMPLE), tmp_path / "out.csv"
+    commands = [
+        ["info", sample],
+        ["info", "--json", "-", sample],
+        ["info", "--verify", sample],
+        ["watch", sample, "--once"],
+        ["export", sample, "--to", "csv", "--out", str(csv)],
+    ]
+    answers = run(SOLVERS, *commands)
+    for words, (out, err) in zip(commands, answers, strict=True):
+        assert err == "", words
+        assert out.endswith("\n0"), words
+    about, data, checked, watched, _ = (out for out, _ in answers)
+    assert "5168" in about
+    assert "5168" in data
+    assert "every check passed" in checked
+    assert "sample-plain.h5" in watched
+    assert len(csv.read_text(encoding="utf-8").splitlines()) == 5169
 
 
 def test_a_package_that_is_needed_is_noticed() -> None:
-    ended = run("h5py", "info", str(SAMPLE))
-    assert ended.returncode == 1
+    ended = start("h5py", ["info", str(SAMPLE)])
+    assert ended.stdout == "1\f"
     assert "h5py is imported" in ended.stderr
 
 
