@@ -45,7 +45,7 @@ kind = "half_sine"
 amplitude_kV = 4.0
 frequency_Hz = 2.0
 """
-LONG = LOBE.replace("frequency_Hz = 2.0", "frequency_Hz = 0.02")
+LONG = LOBE.replace("frequency_Hz = 2.0", "frequency_Hz = 0.1")
 PLAN = """\
 name = "few"
 sequence = "lobe.toml"
