@@ -29,6 +29,7 @@ from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.drivers.settings import LimitsSettings
 from dearig.window.campaign.page import CampaignPage
+from dearig.window.jobs.worker import Worker
 from dearig.window.kit.theme import LIGHT, prepare_plots
 from dearig.window.run.controls import StepButton
 from dearig.window.run.page import RunPage
@@ -239,6 +240,28 @@ def shared_window(
     shown.leave()
     shown.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+
+
+class KeptWorker(Worker):
+    """A worker whose process stays for the next page: to start one takes two seconds."""
+
+    def close(self) -> None:
+        """Drop all jobs; a late answer of the last one counts no longer."""
+        self._urgent.clear()
+        self._waiting.clear()
+        self._current = None
+
+
+@pytest.fixture(scope="module")
+def kept_processes(qapp: QApplication) -> Iterator[None]:
+    """One process that reads recordings, and one that makes studies, for all pages of a file."""
+    with pytest.MonkeyPatch.context() as patch:
+        workers = {name: KeptWorker() for name in ("recordings.library", "study.page")}
+        for name, worker in workers.items():
+            patch.setattr(f"dearig.window.{name}.Worker", lambda *_, worker=worker: worker)
+        yield
+        for worker in workers.values():
+            Worker.close(worker)
 
 
 def put_back(window: MainWindow, qtbot: QtBot) -> MainWindow:

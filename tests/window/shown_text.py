@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from PySide6 import QtGui
 from PySide6.QtCore import QAbstractListModel, QCoreApplication, QEvent, QPoint, QRect, Qt
@@ -56,7 +56,11 @@ _NUMBER = 12  # px, height of a number of an axis
 _ROWS = 400  # rows of a table that are looked at
 
 
-def shown_texts(window: QWidget) -> Iterator[tuple[QWidget, str]]:
+#: A widget and a text of it.
+Shown = tuple[QWidget, str]
+
+
+def shown_texts(window: QWidget) -> Iterator[Shown]:
     """Yield the texts of all widgets in ``window``, their tips and their cells among them.
 
     Texts that the operator writes, in editors and fields, are not among them.
@@ -113,26 +117,22 @@ def _visible(text: str, form: Qt.TextFormat = Qt.TextFormat.AutoText) -> str:
     return document.toPlainText()
 
 
-def rendered_markup(window: QWidget, within: str, tag: str) -> list[str]:
-    """Return the texts in which ``within``, a part of a name, is shown without its ``tag``.
+def rendered_markup(texts: Iterable[Shown], within: str, tag: str) -> list[str]:
+    """Return those of ``shown_texts`` that show ``within``, a part of a name, without its ``tag``.
 
     A name from a file is ``tag`` and ``within``; Qt that takes it for HTML shows it without.
     """
     return [
         f"{type(widget).__name__}: {text!r}"
-        for widget, text in shown_texts(window)
+        for widget, text in texts
         if within in text and tag not in text
     ]
 
 
-def unreadable(window: QWidget) -> list[str]:
-    """Return the shown texts that hold a key of a file, ``+-`` for ±, or ``us`` for µs."""
+def unreadable(texts: Iterable[Shown]) -> list[str]:
+    """Return those of ``shown_texts`` that hold a key of a file, ``+-`` for ±, or ``us`` for µs."""
     return sorted(
-        {
-            f"{type(widget).__name__}: {text!r}"
-            for widget, text in shown_texts(window)
-            if _RAW.search(text)
-        }
+        {f"{type(widget).__name__}: {text!r}" for widget, text in texts if _RAW.search(text)}
     )
 
 

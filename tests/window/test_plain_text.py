@@ -23,7 +23,7 @@ from dearig.window.study.page import StudyPage
 from tests.report.test_study_file import made as study_on_paper
 from tests.tools.diagnosis import diagnose_outcome
 from tests.window.made_recordings import made
-from tests.window.shown_text import cut_off, rendered_markup, unreadable
+from tests.window.shown_text import cut_off, rendered_markup, shown_texts, unreadable
 
 TAG, WITHIN = "<b>", "bold"
 HOSTILE = "<b>bold</b><img src=//host/x.png>"
@@ -63,7 +63,8 @@ def test_every_page_shows_whole_words_without_keys_and_markup(
 
     def look(state: str) -> None:
         qtbot.wait(1)  # what is laid out later is laid out now
-        for found in (cut_off(window), unreadable(window), rendered_markup(window, WITHIN, TAG)):
+        texts = list(shown_texts(window))
+        for found in (cut_off(window), unreadable(texts), rendered_markup(texts, WITHIN, TAG)):
             wrong.extend(f"{state}: {words}" for words in found)
 
     def until(condition: Callable[[], bool]) -> None:
@@ -111,9 +112,10 @@ def test_every_page_shows_whole_words_without_keys_and_markup(
 
 def test_the_look_at_the_window_sees_what_is_wrong(qtbot: QtBot) -> None:
     for text in ("amplitude_kV", "+-5 V", "3 us"):
-        assert len(unreadable(_shown(label(text), qtbot))) == 1, text
-    assert len(rendered_markup(_shown(QLabel(HOSTILE), qtbot), WITHIN, TAG)) == 1
-    assert rendered_markup(_shown(label(HOSTILE), qtbot), WITHIN, TAG) == []
+        assert len(unreadable(shown_texts(_shown(label(text), qtbot)))) == 1, text
+    for widget, wrong in ((QLabel(HOSTILE), 1), (label(HOSTILE), 0)):
+        texts = shown_texts(_shown(widget, qtbot))
+        assert len(rendered_markup(texts, WITHIN, TAG)) == wrong
     for widget in (label("a long text"), QPushButton("a long text")):
         window = _shown(widget, qtbot)
         assert cut_off(window) == []

@@ -21,6 +21,8 @@ from dearig.window.recordings.page import RecordingsPage
 from dearig.window.session.state import Session
 from tests.window.made_recordings import killed, made
 
+pytestmark = pytest.mark.usefixtures("kept_processes")
+
 # a process has to start, on a machine that may be busy
 _PATIENCE = 120_000
 

@@ -29,6 +29,8 @@ from tests.tools.diagnosis import EXPERIMENT, diagnose_outcome
 from tests.window.conftest import press
 from tests.window.made_recordings import LOBES, SLOW_RIG, made, of_rig
 
+pytestmark = pytest.mark.usefixtures("kept_processes")
+
 _PATIENCE = 240_000  # ms; a search on a machine that may be busy
 
 Keep = Callable[[QWidget], None]
