@@ -275,6 +275,7 @@ def put_back(window: MainWindow, qtbot: QtBot) -> MainWindow:
     window.show_page(page)
     page.paced.setChecked(False)
     page.operator.setText("")
+    session.set_address("sim")
     session.set_rig_file(None, "", RigFile())
     session.set_sequence(PRESETS["thesis"], Path())
     qtbot.waitUntil(

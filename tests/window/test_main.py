@@ -100,7 +100,7 @@ lead_in_s = 0.3
 [[segment]]
 kind = "half_sine"
 amplitude_kV = 6.0
-frequency_Hz = 0.1
+frequency_Hz = 0.2
 '''
 def show(self):
     shown(self)

@@ -25,13 +25,26 @@ from pytestqt.qtbot import QtBot
 
 from dearig.window.campaign.page import CampaignPage
 from dearig.window.imports.dialog import ImportDialog
+from dearig.window.kit.number_box import NumberBox, WholeBox
 from dearig.window.rig.page import RigPage
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
+from tests.window.conftest import put_back
 from tests.window.imports.test_dialog import Here, settled
 
 FIELDS = (QAbstractSpinBox, QComboBox, QAbstractSlider, QTabBar)
 DOWN = QPoint(0, -120)  # one notch of a wheel, in eighths of a degree
+
+
+@pytest.fixture
+def window(shared_window: MainWindow, qtbot: QtBot) -> MainWindow:
+    """The window of this file: fields are as they were after each test."""
+    return put_back(shared_window, qtbot)
+
+
+@pytest.fixture
+def session(window: MainWindow) -> Session:
+    return window.session
 
 
 def fields(place: QWidget) -> Iterator[QWidget]:
@@ -97,6 +110,16 @@ def test_no_field_of_any_page_changes_by_the_wheel(qtbot: QtBot, window: MainWin
     assert window.session.rig_file == type(window.session.rig_file)()
 
 
+def test_the_window_has_no_fields_with_arrows_of_another_class(window: MainWindow) -> None:
+    others = [
+        widget
+        for page in window.pages
+        for widget in page.findChildren(QWidget)
+        if widget.inherits("QAbstractSpinBox") and not isinstance(widget, NumberBox | WholeBox)
+    ]
+    assert others == []
+
+
 def test_no_field_of_the_import_dialog_changes_by_the_wheel(
     qtbot: QtBot, window: MainWindow, session: Session, tmp_path: Path
 ) -> None:
@@ -154,6 +177,7 @@ def test_a_field_around_a_field_is_kept_out_too(qtbot: QtBot, window: MainWindow
     for notch in (DOWN, -DOWN):
         turn(inner, notch)
     assert (inner.value(), outer.currentIndex()) == (0, 0)
+    outer.deleteLater()
 
 
 def test_nothing_is_dropped_on_a_field(window: MainWindow) -> None:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import QLocale
-from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.window.kit.number_box import NumberBox, WholeBox
-from dearig.window.shell.frame import MainWindow
 
 WAS = 2.0
 
@@ -48,13 +46,3 @@ def test_a_whole_number_too(qtbot: QtBot, typed: str, value: int) -> None:
     box.lineEdit().clear()
     qtbot.keyClicks(box, typed)
     assert box.value() == value
-
-
-def test_the_window_has_no_other_fields_with_arrows(window: MainWindow) -> None:
-    others = [
-        widget
-        for page in window.pages
-        for widget in page.findChildren(QWidget)
-        if widget.inherits("QAbstractSpinBox") and not isinstance(widget, NumberBox | WholeBox)
-    ]
-    assert others == []
