@@ -58,10 +58,15 @@ def svg(figure: Figure, prefix: str, label: str) -> str:
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    stream = io.StringIO()
-    with style():
-        # savefig would draw all of it once more beforehand, for the layout alone
-        FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
+    stream, canvas, dpi = io.StringIO(), figure.canvas, figure.dpi
+    notes = {"Date": None, "Creator": None}
+    try:
+        with style():
+            # savefig would draw all of it once more beforehand, for the layout alone
+            FigureCanvasSVG(figure).print_svg(stream, metadata=notes)  # type: ignore[no-untyped-call]
+    finally:  # it is drawn as before where it is saved elsewhere
+        figure.set_canvas(canvas)
+        figure.dpi = dpi
     text = stream.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)

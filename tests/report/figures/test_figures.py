@@ -356,12 +356,13 @@ class TestOutput:
         )
         assert first == second
 
-    def test_drawing_leaves_no_trace_in_the_settings(self):
+    def test_drawing_leaves_no_trace_in_the_settings_and_the_figure(self):
         import matplotlib as mpl
 
-        before = dict(mpl.rcParams)
-        svg(figures.loop_figure(film_comparison()), "f1", "x")
-        assert dict(mpl.rcParams) == before
+        figure = figures.loop_figure(film_comparison())
+        before = (dict(mpl.rcParams), figure.canvas, figure.dpi)
+        svg(figure, "f1", "x")
+        assert (dict(mpl.rcParams), figure.canvas, figure.dpi) == before
 
     def test_matplotlib_waits_until_something_is_drawn(self):
         code = (
