@@ -24,7 +24,7 @@ def test_kill_9_in_the_middle_loses_and_doubles_no_run(tmp_path: Path) -> None:
         while process.poll() is None:
             if (out / JOURNAL).exists() and (out / JOURNAL).read_bytes().count(b"\n") >= 5:
                 return
-            time.sleep(0.005)
+            time.sleep(0.005)  # the campaign itself needs the processor
 
     assert kill_once(plan, when)
     done("campaign", plan, "--out", out, "--rig-file", tmp_path / "rig.toml", "--resume")
