@@ -293,3 +293,15 @@ def test_blocks_of_a_large_file_join_without_a_seam(
     found = source.read(source.names)
     np.testing.assert_allclose(found["voltage_V"], VOLTAGE, rtol=1e-8)
     assert [source.row(i) for i in (0, 30, 59)] == ["line 2", "line 32", "line 61"]
+
+
+@pytest.mark.parametrize("first", range(3, 12))
+def test_rows_with_a_further_cell_are_refused_wherever_they_begin(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, first: int
+) -> None:
+    # also where a block has only such rows, of which pandas leaves the last cells out
+    monkeypatch.setattr("dearig.recording.importers.formats.text_blocks.BLOCK", 97)
+    rows = [f"{i},{i},{i}{',7' if i >= first else ''}" for i in range(30)]
+    text = "\n".join(["time_s,voltage_V,displacement_mm", *rows, ""])
+    with refused(f"line {first + 2}: 4 values, and the table has 3 columns"):
+        taken(tmp_path, text)

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 
@@ -399,6 +400,8 @@ class TextFile(NamedColumns[TextColumn]):
         layout, wanted = self.layout, self._wanted
         if not self._is_plain or not wanted or (b"#" in block and _NOT_COMMENT.search(block)):
             return None
+        if self._is_too_long(block):  # pandas would leave out the last cells of all rows
+            return None
         undecided = {c.place for c in wanted if c.undecided and c.name not in self._decided}
         try:
             table = pd.read_csv(
@@ -420,6 +423,15 @@ class TextFile(NamedColumns[TextColumn]):
         last = table[layout.cells - 1]
         whole = last.dtype.kind == "f" or bool((last.astype(str) != "").all())
         return values if whole and all(np.isfinite(v).all() for v in values) else None
+
+    def _is_too_long(self, block: bytes) -> bool:
+        """Return whether the first row of ``block`` has more cells than the table."""
+        lines = (line.decode("utf-8", "replace").rstrip("\r\n") for line in BytesIO(block))
+        row = next(filter(holds_data, lines), "")
+        try:
+            return any(cells_of(row, self.layout.delimiter)[self.layout.cells :])
+        except csv.Error:
+            return True
 
     def _apart(self, block: bytes) -> list[np.ndarray]:
         """Return the numbers of each column of ``block``, without cells that are none."""
@@ -497,6 +509,8 @@ usecols=sorted(places), dtype=str, na_filter=False,
             cells = cells_of(content, self.layout.delimiter)
         except csv.Error as error:
             return f": it cannot be split: {error}", [], ""
+        if not any(cells[self.layout.cells :]):  # each line may end with a delimiter
+            cells = cells[: self.layout.cells]
         if len(cells) != self.layout.cells:
             said = f": {len(cells)} values, and the table has {self.layout.cells} columns"
             return said, [], ""
