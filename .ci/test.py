@@ -13,7 +13,12 @@ DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 QUICK = "import gc; gc.disable()\n"
 # Two processes that find no kernels would compile them twice: each compiles half of what both need,
 # in the order in which these imports made them, and then its own.
-HALF = "from tests.tools.fit_kernels import compile_fit_kernels, compile_half; compile_half({})\n"
+HALF = """
+import sys
+sys.path.append("tests/tools")  # the package of the tests needs pytest
+from fit_kernels import compile_fit_kernels, compile_half
+compile_half({})
+"""
 RUNS = HALF.format(0) + "from dearig.acquisition.warm_up import compile_kernels; compile_kernels()"
 FITS = HALF.format(1) + "compile_fit_kernels()"
 COLD = "import sys; from dearig.acquisition.warm_up import is_warm; sys.exit(not is_warm())"
