@@ -21,6 +21,7 @@ from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 
 PATIENCE = 120_000  # ms
+SEEN = 1  # the code of an event loop that ends because of what it waits for
 KEYSYMS = {
     "Escape": 0xFF1B,
     "Control": 0xFFE3,
@@ -86,13 +87,13 @@ def shown(session: Session) -> MainWindow:
 def until(condition: Callable[[], bool], what: str) -> None:
     loop, late = QEventLoop(), QTimer()
     look = QTimer(interval=10)
-    look.timeout.connect(lambda: condition() and loop.quit())
+    # seen once is enough: that a button answers may be over at the next look on a busy machine
+    look.timeout.connect(lambda: condition() and loop.exit(SEEN))
     late.setSingleShot(True)
     late.timeout.connect(loop.quit)
     look.start()
     late.start(PATIENCE)
-    loop.exec()
-    if not condition():
+    if loop.exec() != SEEN:
         said = ""
         for window in QApplication.topLevelWidgets():
             if isinstance(window, MainWindow):
