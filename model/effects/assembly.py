@@ -150,41 +150,10 @@ def {effect}_stiffness(c, k, m, j, lam, rate):
 """
 
 
-# Which effects are not neutral: a loop, since a line for each parameter takes long to compile.
-_FINDER = """
-
-_{name}_at = np.array({at!r}, np.int64)
-_{name}_neutral = np.array({neutral!r}, np.float64)
-_{name}_bit = np.array({bits!r}, np.int64)
-
-
-@by_name("int64({vector})")
-def {name}(c):
-    found = 0
-    for i in range(len(_{name}_at)):
-        if c[_{name}_at[i]] != _{name}_neutral[i]:
-            found |= _{name}_bit[i]
-    return found
-"""
-
-
-def _finder(function: str, names: Iterable[str]) -> str:
-    """Return the source of a function that finds those of the effects that are not neutral."""
-    tests = [
-        (PLACES[name].column(effect, p.name), p.neutral, _OF_EFFECT[name])
-        for name, effect in ((name, EFFECTS[name]) for name in names)
-        for p in effect.parameters
-        if p.neutral is not None
-    ]
-    at, neutral, bits = (list(values) for values in zip(*tests, strict=True))
-    return _FINDER.format(name=function, at=at, neutral=neutral, bits=bits, vector=_VECTOR)
-
-
 def _text() -> str:
     """Return the source of the hooks."""
     names = sorted(EFFECTS, key=_rank)
     lines = [
-        "import numpy as np",
         "from dearig.model.compiled.by_name import by_name",
         "from dearig.model.compiled.jit import jit",
     ]
@@ -217,8 +186,10 @@ def _text() -> str:
                 ]
         lines.append(f"    return {last}")
     for function, of_sensor in (("active", False), ("active_sensors", True)):
-        tested = [n for n in names if PLACES[n].is_sensor == of_sensor]
-        lines.append(_finder(function, tested))
+        lines += ["", "", f'@by_name("int64({_VECTOR})")', f"def {function}(c):", "    found = 0"]
+        for name in (n for n in names if PLACES[n].is_sensor == of_sensor):
+            lines += [f"    if {_active(name)}:", f"        found |= {_OF_EFFECT[name]}"]
+        lines.append("    return found")
     return "\n".join([*lines, ""])
 
 

@@ -215,6 +215,7 @@ def test_no_kernel_is_compiled_anew_for_arrays_that_cannot_be_written() -> None:
     thesis = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
     film.simulate(time, 1.0 + time)
     thesis.simulate(Drive(time, time))
+    reading_of(thesis.coefficients(), 0.1, Drive(time, time), fidelity=kernel.QUICK)
     before = compiled_versions(film_kernel, drive_kernel)
     film.simulate(fixed, 1.0 + time)
     film.simulate(fixed, pulled)
