@@ -28,7 +28,7 @@ SEEDS = (0, 3)
 @functools.cache
 def fit_of_twins(seed: int) -> Identification:
     base = replace(TWINS, network=Network.gent((50e3,) * 3, (1e4,) * 3, (0.3, 3.0)))
-    return identify([record_of(TWINS, thesis_drive(rate=50.0), seed=seed)], base)
+    return identify([record_of(TWINS, thesis_drive(rate=100.0), seed=seed)], base)
 
 
 @pytest.mark.parametrize("seed", mostly_deep(SEEDS, [SEEDS[0]]))
