@@ -16,8 +16,8 @@ QUICK = "import gc; gc.disable()\n"
 HALF = """
 import sys
 sys.path.append("tests/tools")  # the package of the tests needs pytest
-from fit_kernels import compile_fit_kernels, compile_half
-compile_half({})
+from fit_kernels import compile_fit_kernels, compile_some
+compile_some({}, 2)
 """
 RUNS = HALF.format(0) + "from dearig.acquisition.warm_up import compile_kernels; compile_kernels()"
 FITS = HALF.format(1) + "compile_fit_kernels()"

@@ -1,7 +1,7 @@
 """Addresses of the kernels that others call by name (``dearig.model.compiled.by_name``).
 
-The linker needs the address of all that a kernel calls by name before it makes or loads the
-kernel's code: what it cannot find ends the program.
+Before the linker makes or loads the code of a kernel, it needs the address of each kernel that this
+one calls by name: a name that it cannot find ends the program.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Kernels that their callers find by name in the running program, and do not contain.
 
 Numba puts what a kernel calls into the kernel's own code, and optimises all of it once more: the
-hooks of all effects, in a dozen kernels, were half of the first compilation. A kernel made here is
-compiled once. Its callers know its name and its types; its address is given to the linker before
+effects stood in a dozen kernels, a third of the first compilation. A kernel made here is compiled
+once. Its callers know its name and its types; its address is given to the linker before
 any of them is compiled or read from the cache.
 """
 
@@ -21,7 +21,10 @@ from numba.extending import lower_builtin
 from dearig.model.compiled.addresses import PROVIDERS, provide
 from dearig.model.compiled.jit import is_enabled, jit
 
-__all__ = ["by_name", "compile_some"]
+__all__ = ["MATRIX", "VECTOR", "by_name", "compile_some"]
+
+#: Numba's texts for contiguous arrays of numbers that can be written, of one and two dimensions.
+VECTOR, MATRIX = "float64[::1]", "float64[:, ::1]"
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 

@@ -191,7 +191,7 @@ class _Implementation(CompileResultCacheImpl):
         return names_in(cres.library._final_module), cast(Any, super()).reduce(cres)
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """Return the kernel that was read, once all that it calls can be found."""
+        """Return the kernel that was read; first let the linker find those that it calls."""
         names, reduced = payload
         provide(*names)
         return cast(Any, super()).rebuild(target_context, reduced)

@@ -18,6 +18,7 @@ from operator import or_
 from types import MappingProxyType
 from typing import Any
 
+from dearig.model.compiled.by_name import VECTOR
 from dearig.model.compiled.generated import generated_module
 from dearig.model.effects.hooks import FASTEST, HOOKS
 from dearig.model.effects.registry import EFFECTS, PLACES
@@ -60,8 +61,7 @@ _COMBINE = MappingProxyType(
 _INTO_CALLERS = ("supply", "polarise", "permittivity", "soften", "stress")
 # Types of what a hook returns, by the number of its values, and of on, c, m.
 _RETURNED = ("int64", "float64", "UniTuple(float64, 2)")
-_VECTOR = "float64[::1]"
-_FIRST = f"int64, {_VECTOR}, {_VECTOR}"
+_FIRST = f"int64, {VECTOR}, {VECTOR}"
 # The order of effects is that of the signal path; a sensor's lag comes before its nonlinearity.
 _ORDER = ("amplifier", "electrode", "dielectric", "film stress", "inertia", "load", "environment")
 _LAST_BIT = 62  # of a 64-bit number that is not negative
@@ -186,7 +186,7 @@ def _text() -> str:
                 ]
         lines.append(f"    return {last}")
     for function, of_sensor in (("active", False), ("active_sensors", True)):
-        lines += ["", "", f'@by_name("int64({_VECTOR})")', f"def {function}(c):", "    found = 0"]
+        lines += ["", "", f'@by_name("int64({VECTOR})")', f"def {function}(c):", "    found = 0"]
         for name in (n for n in names if PLACES[n].is_sensor == of_sensor):
             lines += [f"    if {_active(name)}:", f"        found |= {_OF_EFFECT[name]}"]
         lines.append("    return found")

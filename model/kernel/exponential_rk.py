@@ -18,7 +18,7 @@ from dearig.model.coefficients import (
     RATE,
     WIDTH,
 )
-from dearig.model.compiled.by_name import by_name
+from dearig.model.compiled.by_name import MATRIX, VECTOR, by_name
 from dearig.model.compiled.jit import allocating, inlined, jit
 from dearig.model.compiled.packs import first as first_film
 from dearig.model.compiled.packs import larger, spread
@@ -52,7 +52,6 @@ _GENT = SPRINGS.index("gent")  # the neo-Hookean spring comes before it
 BRANCHES_MAX = 3  #: written out in the step
 _INERTIA_AT = 2 + 3 * (1 + BRANCHES_MAX)  # in the film table
 TABLE = _INERTIA_AT + 1  #: numbers of the film table
-_VECTOR = "float64[::1]"
 
 
 @jit
@@ -328,8 +327,8 @@ def film_steps(
 
 
 @by_name(
-    f"none(int64, {_VECTOR}, {_VECTOR}, float64[:, ::1], {_VECTOR}, {_VECTOR}, "
-    f"{'float64, ' * 5}int64, int64, {_VECTOR})"
+    f"none(int64, {VECTOR}, {VECTOR}, {MATRIX}, {VECTOR}, {VECTOR}, "
+    f"{'float64, ' * 5}int64, int64, {VECTOR})"
 )
 def _steps_with_effects(
     acting: int,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from dearig.model.coefficients import INERTIA, REST
-from dearig.model.compiled.by_name import by_name
+from dearig.model.compiled.by_name import MATRIX, VECTOR, by_name
 from dearig.model.compiled.jit import allocating, jit, read_only
 from dearig.model.compiled.packs import WIDTH, rows
 from dearig.model.effects import MEMORY
@@ -50,8 +50,7 @@ _GRAIN = 1e-3  # of the stiffness: propagators of a log differ by more, see STIF
 
 
 @by_name(
-    "none(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], "
-    "float64, float64, float64, float64, int64, float64[:, ::1])"
+    f"none({MATRIX}, {MATRIX}, {VECTOR}, {MATRIX}, {MATRIX}, {'float64, ' * 4}int64, {MATRIX})"
 )
 def _carry_plain(
     table: np.ndarray,
@@ -74,9 +73,8 @@ def _carry_plain(
 
 
 @by_name(
-    "none(int64, float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], "
-    "float64[::1], float64[:, ::1], float64[:, ::1], float64, float64, float64, float64, float64, "
-    "int64, float64[:, ::1])"
+    f"none(int64, {MATRIX}, int64[::1], {MATRIX}, {MATRIX}, {MATRIX}, {VECTOR}, {MATRIX}, "
+    f"{MATRIX}, {'float64, ' * 5}int64, {MATRIX})"
 )
 def _carry(
     moving: int,

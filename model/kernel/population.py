@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, HELD, INERTIA, REST
-from dearig.model.compiled.by_name import by_name
+from dearig.model.compiled.by_name import MATRIX, by_name
 from dearig.model.compiled.jit import allocating, inlined, jit, read_only
 from dearig.model.compiled.packs import WIDTH, rows
 from dearig.model.effects import MEMORY, SENSOR_MEMORY
@@ -143,10 +143,7 @@ def _all_admissible(room: _Pack) -> bool:
     return good
 
 
-@by_name(
-    "none(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], "
-    "float64, float64, float64, float64, int64, int64, float64[:, ::1])"
-)
+@by_name(f"none({f'{MATRIX}, ' * 5}{'float64, ' * 4}int64, int64, {MATRIX})")
 def _steps(
     table: np.ndarray,
     gives: np.ndarray,

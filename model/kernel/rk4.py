@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, INERTIA, UNIFORM
-from dearig.model.compiled.by_name import by_name
+from dearig.model.compiled.by_name import MATRIX, VECTOR, by_name
 from dearig.model.compiled.jit import inlined
 from dearig.model.kernel.effect_forces import (
     COMMIT,
@@ -19,8 +19,7 @@ from dearig.model.kinematics import electric
 
 __all__ = ["rk4_steps"]
 
-_VECTOR, _MATRIX = "float64[::1]", "float64[:, ::1]"
-_PLAIN = f"{_VECTOR}, {_MATRIX}, {_VECTOR}, {'float64, ' * 5}int64, int64, {_MATRIX}, {_VECTOR}"
+_PLAIN = f"{VECTOR}, {MATRIX}, {VECTOR}, {'float64, ' * 5}int64, int64, {MATRIX}, {VECTOR}"
 
 
 @inlined

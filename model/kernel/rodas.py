@@ -21,7 +21,7 @@ from dearig.model.coefficients import (
     UNIFORM,
     WIDTH,
 )
-from dearig.model.compiled.by_name import by_name
+from dearig.model.compiled.by_name import MATRIX, VECTOR, by_name
 from dearig.model.compiled.jit import jit
 from dearig.model.film.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, shape_at
 from dearig.model.kernel.motion import admissible, rates
@@ -139,10 +139,7 @@ def rodas_step(
     return float(error / _TOLERANCE)
 
 
-@by_name(
-    "Tuple((int64, float64))(float64[::1], float64[:, ::1], float64[::1], float64, float64, "
-    "float64, float64, float64[:, ::1])"
-)
+@by_name(f"Tuple((int64, float64))({VECTOR}, {MATRIX}, {VECTOR}, {'float64, ' * 4}{MATRIX})")
 def cross_by_rodas(
     c: np.ndarray,
     springs: np.ndarray,

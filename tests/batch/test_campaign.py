@@ -47,7 +47,7 @@ def test_every_run_is_played_once_in_order(bench: Bench) -> None:
         bench.play()
 
 
-#: A first run and a last one: where it is killed anywhere, further ones tell nothing more.
+#: A first run and a last one: a kill between further ones is like a kill between these.
 TWO = PLAN.replace("repeat = 3", "repeat = 2")
 
 

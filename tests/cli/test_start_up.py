@@ -47,8 +47,8 @@ def run(refused: str, *commands: list[str]) -> list[tuple[str, str]]:
     """Return what each of ``commands`` wrote to its two streams, with its code after the first."""
     ended = start(refused, *commands)
     assert ended.returncode == 0, ended.stderr
-    told = zip(ended.stdout.split("\f")[:-1], ended.stderr.split("\f")[:-1], strict=True)
-    answers = list(told)
+    texts = (stream.split("\f")[:-1] for stream in (ended.stdout, ended.stderr))
+    answers = list(zip(*texts, strict=True))
     assert len(answers) == len(commands)
     return answers
 

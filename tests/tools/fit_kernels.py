@@ -9,12 +9,7 @@ from dearig.model.kernel.drive import LOG
 from dearig.model.kernel.lanes import carry_in_lanes
 from dearig.model.simulation.actuator import NO_AIR, Actuator, Drive, readings_of
 
-__all__ = ["compile_fit_kernels", "compile_half"]
-
-
-def compile_half(part: int) -> None:
-    """Compile half of what runs and fits call by name, ``part`` 0 or 1."""
-    compile_some(part, 2)
+__all__ = ["compile_fit_kernels", "compile_some"]
 
 
 def compile_fit_kernels() -> None:

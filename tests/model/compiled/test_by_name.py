@@ -63,7 +63,7 @@ def test_callers_find_it_compiled_or_read_or_compiled_again(tmp_path: Path) -> N
     values = "13.0 5.0 3.0 7.0"
     assert run(tmp_path) == [values, "0"]
     assert run(tmp_path) == [values, "1"]
-    # the caller is still in the cache, and what it calls is not
+    # the cache has the caller, and not the kernel that the caller calls
     gone = [p for p in (tmp_path / "cache").rglob("*.nb?") if p.name.startswith("kernels.ends")]
     assert len(gone) == 2
     for path in gone:

@@ -113,14 +113,14 @@ def test_nothing_is_missing_in_clean_data_of_the_thesis_network():
 
 
 def test_nothing_is_missing_in_clean_film_data_and_progress_rises_from_0_to_1():
-    told = []
+    shown = []
     found = diagnose(
-        [film_record_of(STRIP)], STRIP, workers=1, progress=lambda *step: told.append(step)
+        [film_record_of(STRIP)], STRIP, workers=1, progress=lambda *step: shown.append(step)
     )  # fmt: skip
     require_consistent(found)
     assert found.verdict == NOTHING_MISSING
     assert found.steps == ()
-    stages, fractions = zip(*told, strict=True)
+    stages, fractions = zip(*shown, strict=True)
     assert fractions[0] == 0.0
     assert fractions[-1] == 1.0
     assert all(0.0 <= f <= 1.0 for f in fractions)
