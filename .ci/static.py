@@ -15,7 +15,7 @@ from links import make
 CHECKS = {
     "linter": ["-m", "ruff", "check", "."],
     "formatter": ["-m", "ruff", "format", "--check", "."],
-    "types": ["-m", "mypy"],
+    "types": ["-m", "mypy", "--num-workers", "2"],
     # lint-imports as a call, which is the same on every system
     "layers": ["-c", "from importlinter.cli import lint_imports_command; lint_imports_command()"],
 }
