@@ -29,6 +29,7 @@ from numba.core.caching import (
     FunctionCache,
     UserProvidedCacheLocator,
 )
+from numba.core.runtime.nrt import rtsys
 
 from dearig.model.compiled.addresses import names_in, provide
 from dearig.model.compiled.plugins import entry_points_found, source_files
@@ -199,6 +200,16 @@ class _Implementation(CompileResultCacheImpl):
 
 class _FunctionCache(FunctionCache):
     _impl_class = _Implementation
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the kernel read for ``sig``; None where there is none.
+
+        Numba first imports all that it can compile, a sixth of the time until a command has its
+        first kernel. What was compiled needs none of it but the names of numba's run-time library,
+        and what has to be compiled has it imported by the compiler.
+        """
+        rtsys.initialize(target_context)
+        return cast(Any, super())._load_overload(sig, target_context)
 
 
 class _Cache:

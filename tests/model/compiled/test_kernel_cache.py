@@ -120,6 +120,30 @@ def test_a_kernel_is_compiled_again_when_a_neighbour_that_it_contains_changes(
     assert values == [2.0, 3.0]
 
 
+def test_a_kernel_that_is_read_needs_nothing_of_what_compiles(tmp_path: Path) -> None:
+    (tmp_path / "arrays.py").write_text(
+        "import numpy as np\nfrom dearig.model.compiled.jit import allocating\n\n"
+        "@allocating\ndef waves(n):\n    made = np.empty(n)\n    for i in range(n):\n"
+        "        made[i] = np.sin(i + 1.0)\n    return made[0] + made[n - 1]\n\n"
+        "@allocating\ndef ones(n):\n    return np.ones(n).sum()\n",
+        encoding="utf-8",
+    )
+    called = (
+        "import sys, arrays; print(arrays.waves(3), 'numba.np.arraymath' in sys.modules);"
+        "len(sys.argv) > 1 and print(arrays.ones(3))"
+    )
+    ended = [
+        subprocess.run(
+            [sys.executable, "-B", "-c", called, *more],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            cwd=tmp_path, capture_output=True, text=True, check=True,
+        )
+        for more in ((), ("one that must be compiled",))
+    ]  # fmt: skip
+    value = f"{np.sin(1.0) + np.sin(3.0)}"
+    assert [e.stdout.split() for e in ended] == [[value, "True"], [value, "False", "3.0"]]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="modes of this kind are not there on Windows")
 def test_planted_code_in_a_folder_that_others_may_write_to_is_not_run(
     tmp_path: Path, filled: Path, cache: Path
