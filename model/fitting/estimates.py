@@ -10,16 +10,18 @@ from itertools import count
 import numpy as np
 
 from dearig.model.fitting.intervals import (
+    OPEN,
     BetterPoint,
     correlation_time,
     covariance,
     is_determined,
     natural_ends,
+    open_text,
 )
 from dearig.model.fitting.levenberg import descend, gain_that_counts
 from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
-from dearig.model.fitting.spare import OPEN, Optimum, sums_of_weak, valleys_of, widened
+from dearig.model.fitting.spare import Optimum, sums_of_weak, valleys_of, widened
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
 __all__ = [
@@ -223,7 +225,7 @@ def _estimate(
     """Return the estimate of one parameter with the interval ``span``, and a note on it."""
     low, high = span
     determined = is_determined(low, high) and not at_end
-    note = "" if determined else _open_text(low, high)
+    note = "" if determined else open_text(low, high)
     if held:
         note = _J_WORDS if low > 0.0 else OPEN
     elif at_end:
@@ -280,15 +282,3 @@ def end_text(q: FreeParameter, value: float) -> str:
     ends = () if q.constraint is None else (q.constraint.low, q.constraint.high)
     stated = any(end is not None and math.isclose(value, end, rel_tol=1e-6) for end in ends)
     return AT_STATED_BOUND if stated else AT_BOUND
-
-
-def _open_text(low: float, high: float) -> str:
-    if low < 0.0 < high:
-        return "not distinguishable from 0 with these data"
-    if low == 0.0 and math.isinf(high):
-        return OPEN
-    if math.isinf(high):
-        return "only a lower bound"
-    if low == 0.0:
-        return "only an upper bound"
-    return f"known only within a factor of {high / low:.3g}"

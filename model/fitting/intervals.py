@@ -15,6 +15,7 @@ from dearig.model.fitting.problem import Problem
 
 __all__ = [
     "CHI2_95",
+    "OPEN",
     "BetterPoint",
     "correlation_end",
     "correlation_time",
@@ -26,10 +27,14 @@ __all__ = [
     "linear_ends",
     "linear_widths",
     "natural_ends",
+    "open_text",
     "profile",
     "spectrum_distance",
     "unevenness",
 ]
+
+#: Note of a parameter of which nothing is determined.
+OPEN = "not determined by these data"
 
 CHI2_95 = 3.841458820694124  #: 95 % of chi-square with one degree of freedom
 _NORMAL_95 = math.sqrt(CHI2_95)
@@ -154,6 +159,19 @@ def is_determined(low: float, high: float) -> bool:
     """Whether an interval is narrow enough for its value to be quoted, and excludes 0."""
     near, far = sorted((abs(low), abs(high)))
     return low * high > 0.0 and far < math.inf and far / near <= _DETERMINED_RATIO
+
+
+def open_text(low: float, high: float) -> str:
+    """Return what an interval says of a parameter that it does not determine."""
+    if low < 0.0 < high:
+        return "not distinguishable from 0 with these data"
+    if low == 0.0 and math.isinf(high):
+        return OPEN
+    if math.isinf(high):
+        return "only a lower bound"
+    if low == 0.0:
+        return "only an upper bound"
+    return f"known only within a factor of {high / low:.3g}"
 
 
 def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:

@@ -4,7 +4,8 @@ Two branches of nearly equal relaxation times act as one: the data fix the sum o
 the parts. A fit may then have both, or one of them and another branch that does next to nothing,
 with the same error. A profile that begins at the fit stays in its valley. So each branch that the
 data do not fix is put next to each of the others, and where it is as fast and as slow as the
-records resolve; what is as good there counts for the intervals.
+records resolve; what is as good there counts for the intervals. So does the fit without it, unless
+it gains more than noise alone would at the best of these places.
 """
 
 from __future__ import annotations
@@ -15,12 +16,15 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2 as chi_square
 
 from dearig.model.fitting.intervals import (
     CHI2_95,
+    OPEN,
     BetterPoint,
     is_determined,
     natural_ends,
+    open_text,
     profile,
 )
 from dearig.model.fitting.levenberg import LocalFit, descend
@@ -30,7 +34,6 @@ from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import resolved_times
 
 __all__ = [
-    "OPEN",
     "SPARE",
     "Optimum",
     "Valleys",
@@ -42,12 +45,11 @@ __all__ = [
 
 #: Note of a parameter of a branch that may be two, or none.
 SPARE = "only the sum of several branches is determined"
-#: Note of a parameter of which nothing is determined.
-OPEN = "not determined by these data"
-
 _ITERATIONS = 60  # of a descent into another valley
 _GAIN = 0.01  # of the threshold of an interval, at which it ends
 _FAST, _SLOW = -1, 0  # sites of a branch that is as fast or as slow as the records resolve
+_ABSENT = -2  # site of a branch that is not there
+_NUMBERS = 2  # of a branch that comes in: modulus and time
 _APART = 0.25  # of the logarithm of the times of two halves of a branch; equal ones never part
 
 Span = tuple[float, float]
@@ -93,7 +95,7 @@ class Valleys:
 
     ``spare`` are branches that the data do not fix, ``firm`` the others. A site is the firm branch
     to which the relaxation time of a spare one is nearest, as a logarithm, or an end of what the
-    records resolve. The best fit is among them.
+    records resolve, or that it is absent. The best fit is among them.
     """
 
     best: Optimum
@@ -103,7 +105,52 @@ class Valleys:
 
     def beside(self, branch: int, sites: Sequence[int]) -> list[int]:
         """Return the spare branches that are at a firm ``branch``."""
-        return [s for s, site in zip(self.spare, sites, strict=True) if site == branch]
+        return self._at(branch, sites)
+
+    def held(self, sites: Sequence[int]) -> np.ndarray:
+        """Return which coordinates (d,) bool are not fitted where spare branches are at ``sites``.
+
+        A branch that is absent has none that are.
+        """
+        held = self.best.held.copy()
+        for branch in self._at(_ABSENT, sites):
+            held[[*_columns(self.best.problem.layout, branch).values()]] = True
+        return held
+
+    def allowed(self, sites: Sequence[int]) -> float:
+        """Return the rise of chi-square at which the ``sites`` are as good as the best fit.
+
+        That of a 95 % interval, where each branch has a time of its own. One that is absent, or a
+        half of another, leaves a model of fewer branches: noise alone lowers its chi-square, for
+        each branch that comes in, by a chi-square of two degrees of freedom at each of the places
+        that it may have, and the best fit has the largest of these.
+        """
+        fewer = sum(site > 0 or site == _ABSENT for site in sites)
+        if fewer == 0:
+            return self.best.threshold
+        each = 0.95 ** (1.0 / len(_places(self)))
+        return self.best.inflation * float(chi_square.ppf(each, _NUMBERS * fewer))
+
+    def at(self, sites: Sequence[int]) -> Optimum:
+        """Return the optimum with the spare branches at ``sites``, where each branch stays.
+
+        Its intervals end where those of the best fit would. One that is outside of them is the
+        optimum of a model of fewer branches, and has intervals of its own.
+        """
+        problem = copy(self.best.problem)
+        problem.layout = _cells(self, sites)
+        x = self.points[tuple(sites)]
+        own = float(np.sum(problem.residuals(x) ** 2))
+        chi2 = self.best.chi2 if own <= self.best.chi2 + self.best.threshold else own
+        return replace(self.best, problem=problem, x=x, held=self.held(sites), chi2=chi2)
+
+    def _at(self, site: int, sites: Sequence[int]) -> list[int]:
+        return [s for s, its in zip(self.spare, sites, strict=True) if its == site]
+
+    @property
+    def absent(self) -> frozenset[int]:
+        """Spare branches that need not be there."""
+        return frozenset(b for sites in self.points for b in self._at(_ABSENT, sites))
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -183,15 +230,23 @@ def valleys_of(best: Optimum, estimates: Sequence[Estimate]) -> Valleys | None:
         return None
     alone = Valleys(best, spare, firm, {})
 
-    def followed(start: np.ndarray) -> LocalFit:
+    def followed(start: tuple[np.ndarray, tuple[int, ...]]) -> LocalFit:
         problem = copy(best.problem)  # counts its simulations on its own
-        return descend(problem, start, best.held, _ITERATIONS, _GAIN * best.threshold, quick=False)
+        x, without = start
+        sites = [_ABSENT if b in without else _SLOW for b in spare]
+        enough = _GAIN * best.threshold
+        return descend(problem, x, alone.held(sites), _ITERATIONS, enough, quick=False)
 
-    starts = [start for branch in spare for start in _starts(alone, branch)]
+    starts: list[tuple[np.ndarray, tuple[int, ...]]] = [
+        (start, ()) for branch in spare for start in _starts(alone, branch)
+    ]
+    starts += [_without(alone, some) for some in {*((b,) for b in spare), spare}]
     reached: dict[tuple[int, ...], tuple[float, np.ndarray]] = {}
-    for fit in parallel_map(followed, starts, best.problem.workers, "valley"):
-        chi2, sites = fit.cost * best.problem.samples, _sites(alone, fit.x)
-        if chi2 < reached.get(sites, (best.chi2 + best.threshold,))[0]:
+    for (_, without), fit in zip(
+        starts, parallel_map(followed, starts, best.problem.workers, "valley"), strict=True
+    ):
+        chi2, sites = fit.cost * best.problem.samples, _sites(alone, fit.x, without)
+        if chi2 < reached.get(sites, (best.chi2 + alone.allowed(sites),))[0]:
             reached[sites] = chi2, fit.x
     lowest = min(reached.values(), key=lambda r: r[0], default=(math.inf, best.x))
     if best.chi2 - lowest[0] > best.gain:
@@ -239,11 +294,34 @@ def _places(found: Valleys) -> list[tuple[float, int]]:
     return sorted([*firm, (float(ends[0]), _FAST), (float(ends[1]), _SLOW)])
 
 
-def _sites(found: Valleys, x: np.ndarray) -> tuple[int, ...]:
-    """Return where each spare branch is at coordinates ``x`` (d,)."""
+def _sites(found: Valleys, x: np.ndarray, without: Collection[int] = ()) -> tuple[int, ...]:
+    """Return where each spare branch is at coordinates ``x`` (d,), ``without`` some of them."""
     layout, places = found.best.problem.layout, _places(found)
-    times = [float(x[_time(layout, spare)]) for spare in found.spare]
-    return tuple(min(places, key=lambda p: abs(p[0] - time))[1] for time in times)
+    times = {spare: float(x[_time(layout, spare)]) for spare in found.spare}
+    return tuple(
+        _ABSENT if spare in without else min(places, key=lambda p: abs(p[0] - time))[1]
+        for spare, time in times.items()
+    )
+
+
+def _without(found: Valleys, branches: tuple[int, ...]) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Return coordinates (d,) at which spare ``branches`` are absent, and these.
+
+    The firm branch next to each has its modulus, or the equilibrium spring that of a slow one.
+    """
+    layout = found.best.problem.layout
+    values = layout.values(found.best.x).copy()
+    sites = dict(zip(found.spare, _sites(found, found.best.x), strict=True))
+    for branch in branches:
+        own = _columns(layout, branch)["mu", 0]
+        heir = _columns(layout, 0 if sites[branch] == _SLOW else sites[branch])
+        if ("mu", 0) in heir:
+            values[heir["mu", 0]] += values[own]
+    x = np.clip(layout.coordinates(values), layout.lower, layout.upper)
+    for branch in branches:
+        own = _columns(layout, branch)["mu", 0]
+        x[own] = layout.lower[own]
+    return x, branches
 
 
 def _starts(found: Valleys, branch: int) -> Iterator[np.ndarray]:
@@ -284,11 +362,10 @@ def widened(
     ]
     sums: dict[int, Span] = {}
     try:
-        for sites, x in found.points.items():
-            at = replace(found.best, problem=copy(found.best.problem), x=x)
-            at.problem.layout = _cells(found, sites)
-            jacobian = at.problem.jacobian(x, ~held)
-            if x is not found.best.x:
+        for sites in found.points:
+            at = found.at(sites)
+            jacobian = at.problem.jacobian(at.x, ~at.held)
+            if at.x is not found.best.x:
                 for j in asked:
                     name, q = layout.names[j], layout.quantities[j]
                     ends = natural_ends(q, *at.profile(j, jacobian, tick))
@@ -303,11 +380,17 @@ def widened(
     most = max((high for _, high in sums.values()), default=math.inf)
     # a sum that is not determined either says nothing
     sums = {branch: span for branch, span in sums.items() if is_determined(*span)}
+    absent = {j for b in found.absent for j in _columns(layout, b).values()} - parts
     changed = []
     for e in estimates:
         j = layout.names.index(e.name)
         low, high = spans[e.name]
-        if j in parts and not held[j] and e.constraint is None:
+        if j in absent and not held[j] and e.constraint is None:
+            # what may be absent has no least modulus, and any time
+            high = high if layout.quantities[j].kind == "mu" else math.inf
+            note = e.note if e.at_bound else open_text(0.0, high)
+            changed.append(replace(e, low=0.0, high=high, determined=False, note=note))
+        elif j in parts and not held[j] and e.constraint is None:
             # a part that is faster than the records show may be larger than any sum
             high = max(most, e.high) if layout.quantities[j].kind == "mu" else math.inf
             note = e.note if e.at_bound else SPARE if sums else OPEN
@@ -325,6 +408,8 @@ def _cells(found: Valleys, sites: Sequence[int]) -> FitLayout:
     places = _places(found)
     times = [time for time, _ in places]
     for branch, site in (*zip(found.spare, sites, strict=True), *((b, b) for b in found.firm)):
+        if site == _ABSENT:
+            continue
         j, i = _time(cell, branch), [s for _, s in places].index(site)
         if i > 0:
             cell.lower[j] = max(cell.lower[j], 0.5 * (times[i - 1] + times[i]))
@@ -353,7 +438,7 @@ def _of_sum(
 
 
 def _hull(one: Span, other: Span) -> Span:
-    return min(one[0], other[0]), max(one[1], other[1])
+    return float(min(one[0], other[0])), float(max(one[1], other[1]))
 
 
 def _sum(found: Valleys, branch: int, span: Span) -> Estimate:

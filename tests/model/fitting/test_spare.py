@@ -23,18 +23,20 @@ from tests.tools.reports import identify_outcome
 TWINS = replace(PLAIN, network=Network.gent((50e3, 46.84e3, 57.67e3), (1e4,) * 3, (0.462, 0.470)))
 APART = replace(PLAIN, network=Network.gent((50e3, 46.84e3, 57.67e3), (1e4,) * 3, (0.2, 2.0)))
 SEEDS = (0, 3)
+#: Seed and rate in Hz; with the last noise lowers chi-square by 8.6 in favour of a slow branch.
+RECORDS = [pytest.param(*record) for record in ((0, 100.0), (3, 100.0), (3, 50.0))]
 
 
 @functools.cache
-def fit_of_twins(seed: int) -> Identification:
+def fit_of_twins(seed: int, rate: float = 100.0) -> Identification:
     base = replace(TWINS, network=Network.gent((50e3,) * 3, (1e4,) * 3, (0.3, 3.0)))
-    return identify([record_of(TWINS, thesis_drive(rate=100.0), seed=seed)], base)
+    return identify([record_of(TWINS, thesis_drive(rate=rate), seed=seed)], base)
 
 
-@pytest.mark.parametrize("seed", mostly_deep(SEEDS, [SEEDS[0]]))
-def test_no_part_of_a_sum_has_an_interval_without_the_truth(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "rate"), mostly_deep(RECORDS, [(0, 100.0), (3, 50.0)]))
+def test_no_part_of_a_sum_has_an_interval_without_the_truth(seed: int, rate: float) -> None:
     truth = {"mu_0": 50e3, "mu_1": 46.84e3, "mu_2": 57.67e3, "T_1": 0.462, "T_2": 0.470}
-    for e in fit_of_twins(seed).estimates:
+    for e in fit_of_twins(seed, rate).estimates:
         if e.name in truth:
             assert e.low <= truth[e.name] <= e.high, e
             assert e.low <= e.value <= e.high, e
