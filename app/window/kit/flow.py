@@ -20,6 +20,7 @@ class Flow(QLayout):
         super().__init__(parent)
         self._items: list[QLayoutItem] = []
         self._shares: list[int] = []
+        self._heights: dict[int, int] = {}  # by width; a page that is shown asks a hundred times
         self.setContentsMargins(0, 0, 0, 0)
         self.setSpacing(SPACE // 2)
 
@@ -58,9 +59,16 @@ class Flow(QLayout):
     def hasHeightForWidth(self) -> bool:  # noqa: N802
         return True
 
+    def invalidate(self) -> None:
+        self._heights.clear()
+        super().invalidate()
+
     def heightForWidth(self, width: int) -> int:  # noqa: N802
-        lines = self._lines(width)
-        return sum(map(self._height, lines)) + self.spacing() * max(len(lines) - 1, 0)
+        if width not in self._heights:
+            lines = self._lines(width)
+            between = self.spacing() * max(len(lines) - 1, 0)
+            self._heights[width] = sum(map(self._height, lines)) + between
+        return self._heights[width]
 
     def sizeHint(self) -> QSize:  # noqa: N802
         shown = self._shown()
