@@ -2,8 +2,10 @@
 
 import sys
 
-from bootstrap import prepare, run
+from bootstrap import prepare, run, wait
+from kernels import start_compiling
 
 if __name__ == "__main__":
     python = prepare()
-    sys.exit(run([str(python), "-m", "dearig", "demo", *sys.argv[1:]]))
+    code = wait(*start_compiling(python))  # the demo would compile them in one process
+    sys.exit(code or run([str(python), "-m", "dearig", "demo", *sys.argv[1:]]))
