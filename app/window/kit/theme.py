@@ -23,7 +23,6 @@ __all__ = [
     "digits",
     "pen",
     "prepare_plots",
-    "style_plot",
     "system_theme",
 ]
 
@@ -225,26 +224,3 @@ def pen(colour: str, dashed: bool = False) -> object:
     """Make a pen one pixel wide; wider ones are drawn twenty times as slowly."""
     style = Qt.PenStyle.DashLine if dashed else Qt.PenStyle.SolidLine
     return pg.mkPen(QColor(colour), width=1, style=style)
-
-
-def style_plot(plot: pg.PlotItem, theme: Theme) -> None:
-    """Use the theme's colours in a plot and its widget.
-
-    The left axis has a fixed width, so that the plot does not move while its labels change.
-    """
-    widget = plot.getViewWidget()
-    if widget is not None:
-        widget.setBackground(theme.surface)
-    plot.showGrid(x=True, y=True, alpha=1.0)
-    for name in ("left", "bottom"):
-        axis = plot.getAxis(name)
-        axis.setPen(pg.mkPen(QColor(theme.muted)))
-        axis.setTextPen(pg.mkPen(QColor(theme.text)))
-        # few opaque lines behind the curves: drawing pyqtgraph's own grid takes longer than drawing
-        # the curves
-        axis.setTickPen(pg.mkPen(QColor(theme.raised)))
-        axis.setStyle(maxTickLevel=0, tickAlpha=255)
-        axis.setZValue(-1000)
-    plot.getAxis("left").setWidth(64)
-    plot.setMenuEnabled(False)
-    plot.hideButtons()

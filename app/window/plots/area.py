@@ -211,8 +211,8 @@ class PlotArea(QWidget):
                 lowest[place] = plot
         for plot in self.plots:
             bottom = plot in lowest.values()
-            plot.getAxis("bottom").setStyle(showValues=bottom)
-            plot.getAxis("bottom").showLabel(bottom)
+            plot.axis("bottom").setStyle(showValues=bottom)
+            plot.axis("bottom").showLabel(bottom)
         layout = self.canvas.ci.layout
         for plot in self.plots:
             # a hidden item keeps its least height in a layout of Qt
@@ -226,7 +226,7 @@ class PlotArea(QWidget):
         axes = dict.fromkeys(self._rows, 0.0)
         for plot in lowest.values():
             row = self._rows_of[plot][-1]
-            axes[row] = max(axes[row], plot.getAxis("bottom").minimumHeight())
+            axes[row] = max(axes[row], plot.axis("bottom").minimumHeight())
         total = GAP * (len(shown) + 1.0)
         for row, (weight, least) in self._rows.items():
             height = least + axes[row] if row in shown else 0.0

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QGraphicsObject, QStyleOptionGraphicsItem, QWidget
 
 from dearig.drivers.settings import RigSettings
 from dearig.window.kit.theme import Theme
+from dearig.window.plots.plot import Plot
 
 __all__ = ["MarkLine", "PlotOverlay", "TripLevel", "trip_levels"]
 
@@ -68,8 +69,8 @@ class PlotOverlay(QGraphicsObject):
     the plot, with an arrow. Everything lies behind the curves.
     """
 
-    def __init__(self, plot: pg.PlotItem, scale: float, theme: Theme) -> None:
-        self._view: pg.ViewBox = plot.getViewBox()
+    def __init__(self, plot: Plot, scale: float, theme: Theme) -> None:
+        self._view: pg.ViewBox = plot.vb
         super().__init__(self._view)
         self._scale = scale
         self._theme = theme

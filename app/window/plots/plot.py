@@ -11,9 +11,16 @@ from html import escape
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPainter
-from PySide6.QtWidgets import QGraphicsSceneResizeEvent, QStyleOptionGraphicsItem, QWidget
+from PySide6.QtWidgets import (
+    QGraphicsGridLayout,
+    QGraphicsItem,
+    QGraphicsSceneResizeEvent,
+    QSizePolicy,
+    QStyleOptionGraphicsItem,
+    QWidget,
+)
 
-from dearig.window.kit.theme import Theme, pen, style_plot
+from dearig.window.kit.theme import Theme, pen
 from dearig.window.plots.curve import PlotCurve
 
 __all__ = ["AxisText", "LegendEntry", "Plot"]
@@ -25,6 +32,8 @@ _KEY_POINTS = 9.0  # pt, size of the text of keys and labels
 _LEAST_POINTS = 7.0  # pt, of a label next to a low plot
 _CUT = "\N{HORIZONTAL ELLIPSIS}"
 _DAY = 86_400.0  # s
+_LEFT = 64  # px, width of the left axis
+_OPAQUE = 255  # of the alpha of a colour
 _FEW_DECADES = 2.5  # below this, powers of ten alone are too few labels
 _LABEL = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)$")
 
@@ -75,7 +84,7 @@ class LegendEntry:
         return self.line or self.area or bool(self.symbol)
 
 
-class Plot(pg.PlotItem):
+class Plot(pg.GraphicsWidget):
     """Plot of a ``PlotArea``, which makes it.
 
     The key stands above the curves and hides none. While ``auto_y`` is True, the y axis covers what
@@ -91,44 +100,61 @@ class Plot(pg.PlotItem):
         own_range: bool = False,
         dates: bool = False,
     ) -> None:
-        axes = {
-            side: DecadeAxis(side) if logarithmic else pg.AxisItem(side)
-            for side, logarithmic in (("bottom", log[0]), ("left", log[1]))
-        }
-        if dates:
-            axes["bottom"] = pg.DateAxisItem("bottom")
-        for axis in axes.values():
-            if axis.autoSIPrefix:  # switching it off twice would scale the axis again
-                axis.enableAutoSIPrefix(False)  # the labels have fixed units: kV, mm
-        view = pg.ViewBox(enableMenu=False)
-        super().__init__(viewBox=view, axisItems=axes, enableMenu=False)
+        super().__init__()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.log = log
         self.dates = dates  #: the horizontal axis is Unix time in s, shown as local time
         self.axis_texts: dict[str, AxisText] = {}
         self._labels: dict[str, tuple[str, float]] = {}  # that are shown, with their points
+        self.items: list[QGraphicsItem] = []  #: what was added, in this order
         self.drawn: list[PlotCurve] = []
         self.auto_y = True
         self._own_range = own_range
         self.same_y: tuple[Plot, ...] = (self,)  #: plots with this vertical axis
         self._entries: list[LegendEntry] = []
         self._note = ""
+        self.vb = view = pg.ViewBox(enableMenu=False)
         view.setMouseEnabled(x=False, y=False)  # the area handles the mouse
         view.disableAutoRange()
         view.setAutoVisible(y=True)
         view.enableAutoRange(axis="y", enable=not own_range)
-        for side, logarithmic in zip(("bottom", "left"), log, strict=True):
-            self.getAxis(side).setLogMode(logarithmic)
-        # a row of its own in place of pyqtgraph's title
-        self.layout.removeItem(self.titleLabel)
-        self.titleLabel.setVisible(False)
+        self._axes = {
+            "bottom": pg.DateAxisItem("bottom") if dates else _axis("bottom", log[0]),
+            "left": _axis("left", log[1]),
+        }
         self.key = _Key(self)
-        self.layout.addItem(self.key, 0, 1)
+        self._arrange()
+        for axis, logarithmic in zip(self._axes.values(), log, strict=True):
+            if axis.autoSIPrefix:  # switching it off twice would scale the axis again
+                axis.enableAutoSIPrefix(False)  # the labels have fixed units: kV, mm
+            axis.linkToView(view)
+            axis.setLogMode(logarithmic)
         self.set_axis("left", left)
         self.set_axis("bottom", bottom)
         # a row of the key changes the height of the view, and not that of the plot
         self.vb.sigResized.connect(lambda *_: self._show_label("left"))
 
+    def _arrange(self) -> None:
+        """Put the key above the view, and the axes at its left and below it."""
+        self.rows = QGraphicsGridLayout(self)
+        self.rows.setContentsMargins(1, 1, 1, 1)
+        self.rows.setSpacing(0)
+        self.rows.addItem(self.key, 0, 1)
+        self.rows.setRowFixedHeight(0, 0.0)  # the key is empty
+        self.rows.addItem(self.vb, 1, 1)
+        self.rows.addItem(self._axes["bottom"], 2, 1)
+        self.rows.addItem(self._axes["left"], 1, 0)
+        self.rows.setRowStretchFactor(1, 1)
+        self.rows.setColumnStretchFactor(1, 1)
+        for axis in self._axes.values():
+            # so that a negative place in depth puts it behind the curves
+            axis.setFlag(QGraphicsItem.GraphicsItemFlag.ItemNegativeZStacksBehindParent)
+
     # axes
+
+    def axis(self, side: str) -> pg.AxisItem:
+        """Return the axis ``left`` or ``bottom``."""
+        return self._axes[side]
 
     def set_axis(self, side: str, label: str) -> None:
         """Label the axis ``left`` or ``bottom``; the unit stands in brackets at the end."""
@@ -153,10 +179,11 @@ class Plot(pg.PlotItem):
         if (words, points) != self._labels.get(side):
             self._labels[side] = (words, points)
             # the styles that are given replace all others
-            colour = self.getAxis(side).textPen().color().name()
-            self.setLabel(side, words, **{"font-size": f"{points:g}pt", "color": colour})
+            axis = self._axes[side]
+            colour = axis.textPen().color().name()
+            axis.setLabel(words, **{"font-size": f"{points:g}pt", "color": colour})
             # pyqtgraph centres a label only when the axis changes its size
-            self.getAxis(side).resizeEvent()
+            axis.resizeEvent()
 
     def set_auto_y(self, auto: bool) -> None:
         """Let the y axis cover what is visible, or keep its range."""
@@ -200,6 +227,16 @@ class Plot(pg.PlotItem):
         return self.text_of(side, value)
 
     # contents
+
+    def addItem(self, item: QGraphicsItem, ignoreBounds: bool = False) -> None:  # noqa: N802
+        """Add an item in the units of the axes; one with ``ignoreBounds`` does not affect them."""
+        self.items.append(item)
+        self.vb.addItem(item, ignoreBounds)
+
+    def removeItem(self, item: QGraphicsItem) -> None:  # noqa: N802
+        """Remove an item that was added."""
+        self.items.remove(item)
+        self.vb.removeItem(item)
 
     def add_curve(
         self,
@@ -266,15 +303,26 @@ class Plot(pg.PlotItem):
         self.key.show_entries(self.entries(), values)
 
     def restyle(self, theme: Theme) -> None:
-        """Use the colours of ``theme`` for the axes and the key."""
-        style_plot(self, theme)
+        """Use the colours of ``theme`` for the axes and the key.
+
+        The left axis has a fixed width, so that the plot does not move while its labels change.
+        """
+        for axis in self._axes.values():
+            axis.setPen(pg.mkPen(QColor(theme.muted)))
+            axis.setTextPen(pg.mkPen(QColor(theme.text)))
+            # few opaque lines behind the curves: drawing pyqtgraph's own grid takes longer than
+            # drawing the curves
+            axis.setGrid(_OPAQUE)
+            axis.setTickPen(pg.mkPen(QColor(theme.raised)))
+            axis.setStyle(maxTickLevel=0, tickAlpha=_OPAQUE)
+            axis.setZValue(-1000)
+        self._axes["left"].setWidth(_LEFT)
         self.key.set_colour(theme.text)
 
-    def resizeEvent(self, event: QGraphicsSceneResizeEvent | None) -> None:  # noqa: N802
+    def resizeEvent(self, event: QGraphicsSceneResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
-        if hasattr(self, "key"):  # the layout of pyqtgraph's constructor comes first
-            self.key.arrange()
-            self._show_label("left")
+        self.key.arrange()
+        self._show_label("left")
 
 
 class _SharedBounds(pg.GraphicsObject):
@@ -309,7 +357,26 @@ class _SharedBounds(pg.GraphicsObject):
         """Draw nothing."""
 
 
-class DecadeAxis(pg.AxisItem):
+def _axis(side: str, logarithmic: bool) -> pg.AxisItem:
+    return DecadeAxis(side) if logarithmic else _Axis(side)
+
+
+class _Axis(pg.AxisItem):
+    """Axis that lays out its label when the words change, not with each pen and each range."""
+
+    _words: str | None = None
+
+    def _updateLabel(self) -> None:  # noqa: N802
+        words = self.labelString()
+        if words != self._words:
+            self._words = words
+            super()._updateLabel()
+        else:
+            self.picture = None  # another pen or scale: the ticks are drawn again
+            self.update()
+
+
+class DecadeAxis(_Axis):
     """Logarithmic axis with labels at 1, 2, 5 or at powers of ten, so that none overlap."""
 
     def tickStrings(  # noqa: N802
@@ -378,7 +445,7 @@ class _Key(pg.GraphicsWidget):
             self._rows = rows
             self.setMinimumHeight(rows * height)
             self.setMaximumHeight(rows * height)
-            self._plot.layout.setRowFixedHeight(0, rows * height)
+            self._plot.rows.setRowFixedHeight(0, rows * height)
         self.setToolTip("\n".join(escape(e.name) for e in self._entries))
         self.update()
 

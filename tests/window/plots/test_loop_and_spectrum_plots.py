@@ -131,7 +131,7 @@ def test_keys_name_the_curves_of_one_recording_and_the_recordings_of_several(ses
     assert text.splitlines()[0].count(",") > 4  # the data have all of them
     view.show_model(shown=False)
     assert not view.plots[2].isVisible()
-    assert view.plots[1].getAxis("bottom").style["showValues"]
+    assert view.plots[1].axis("bottom").style["showValues"]
 
 
 # a run

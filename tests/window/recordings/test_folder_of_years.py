@@ -284,7 +284,7 @@ def test_a_trend_has_a_point_for_each_run_of_a_film_that_selects_it(
     times = [time for _, time, _ in points]
     assert np.diff(times).tolist() == [3 * DAY, 6 * DAY]
     assert "3 runs; 1 without this number" in plot.words.full_text
-    assert plot.plot.getAxis("left").labelText == "Peak voltage (kV)"
+    assert plot.plot.axis("left").labelText == "Peak voltage (kV)"
     # the faulty one is told apart without colours
     drawn = {curve.title: curve for curve in plot.plot.drawn}
     assert drawn["with a fault"].symbol == "x" != drawn["finished"].symbol
