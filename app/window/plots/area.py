@@ -164,14 +164,14 @@ class PlotArea(QWidget):
             self._rows[taken] = (weight, least)
         self._rows_of[plot] = range(row, row + rows)
         self.canvas.area_plots.append(plot)
-        chosen = self._groups.setdefault(group, CursorGroup(group))
+        theme = self._session.theme
+        chosen = self._groups.setdefault(group, CursorGroup(group, theme))
         chosen.add(plot)
         if len(chosen.plots) > 1:
             plot.vb.setXRange(*chosen.plots[0].vb.viewRange()[0], padding=0.0)
         self._group_of[plot] = chosen
         plot.vb.sigXRangeChanged.connect(self._x_changed)
-        plot.restyle(self._session.theme)
-        chosen.restyle(self._session.theme)
+        plot.restyle(theme)
         self.arrange()
         return plot
 

@@ -26,10 +26,15 @@ class _CursorLabel(pg.InfLineLabel):
 
 
 class CursorGroup:
-    """Plots with one horizontal axis: their crosshair, their cursors A and B, and the readouts."""
+    """Plots with one horizontal axis: their crosshair, their cursors A and B, and the readouts.
 
-    def __init__(self, name: str) -> None:
+    The lines of a plot are made when one is shown for the first time: most are never shown, and
+    pyqtgraph works on each of them when the range changes.
+    """
+
+    def __init__(self, name: str, theme: Theme) -> None:
         self.name = name
+        self._theme = theme
         self.plots: list[Plot] = []
         self.hair: float | None = None  #: x of the crosshair
         self.cursors: tuple[float, float] | None = None  #: x of A and of B
@@ -41,8 +46,24 @@ class CursorGroup:
     # plots
 
     def add(self, plot: Plot) -> None:
-        """Add a plot, with its lines."""
+        """Add a plot."""
         self.plots.append(plot)
+
+    def remove(self, plot: Plot) -> None:
+        """Forget a plot."""
+        self.plots.remove(plot)
+        self._lines.pop(plot, None)
+        self._level.pop(plot, None)
+        if self._pointer is not None and self._pointer[0] is plot:
+            self._pointer = None
+
+    def restyle(self, theme: Theme) -> None:
+        """Use the colours of ``theme``."""
+        self._theme = theme
+        for plot in self._lines:
+            self._restyle(plot)
+
+    def _make_lines(self, plot: Plot) -> None:
         lines = tuple(pg.InfiniteLine(angle=90) for _ in range(3))
         level = pg.InfiniteLine(angle=0)
         for line in (*lines, level):
@@ -53,25 +74,17 @@ class CursorGroup:
         for line, name in zip(lines[1:], "AB", strict=True):
             line.label = _CursorLabel(line, name, position=0.93)
         self._lines[plot], self._level[plot] = lines, level
+        self._restyle(plot)
 
-    def remove(self, plot: Plot) -> None:
-        """Forget a plot."""
-        self.plots.remove(plot)
-        del self._lines[plot], self._level[plot]
-        if self._pointer is not None and self._pointer[0] is plot:
-            self._pointer = None
-
-    def restyle(self, theme: Theme) -> None:
-        """Use the colours of ``theme``."""
-        hair = pg.mkPen(QColor(theme.muted), width=1, style=Qt.PenStyle.DotLine)
-        cursor = pg.mkPen(QColor(theme.accent), width=1)
-        for plot in self.plots:
-            first, *others = self._lines[plot]
-            first.setPen(hair)
-            self._level[plot].setPen(hair)
-            for line in others:
-                line.setPen(cursor)
-                line.label.setColor(QColor(theme.accent))
+    def _restyle(self, plot: Plot) -> None:
+        colour = QColor(self._theme.accent)
+        hair = pg.mkPen(QColor(self._theme.muted), width=1, style=Qt.PenStyle.DotLine)
+        first, *others = self._lines[plot]
+        first.setPen(hair)
+        self._level[plot].setPen(hair)
+        for line in others:
+            line.setPen(pg.mkPen(colour, width=1))
+            line.label.setColor(colour)
 
     @property
     def shown(self) -> list[Plot]:
@@ -109,6 +122,10 @@ class CursorGroup:
 
     def _place(self) -> None:
         places = (self.hair, *(self.cursors or (None, None)))
+        if places != (None, None, None):
+            for plot in self.plots:
+                if plot not in self._lines:
+                    self._make_lines(plot)
         top = next(iter(self.shown), None)
         for plot, lines in self._lines.items():
             for line, place in zip(lines, places, strict=True):
