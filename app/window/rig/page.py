@@ -58,7 +58,6 @@ class RigPage(Page):
     """Chooses and checks the rig, and edits the rig file with faults next to their fields."""
 
     title = "Rig"
-    at_start = True
     edits = "rig file"
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -88,6 +87,14 @@ class RigPage(Page):
         self._show_address()
         self._show_outcome()
         self._show_all()
+
+    @classmethod
+    def needed(cls, session: Session) -> bool:
+        """Return whether the address is that of a card: a wrong one blocks arming from the start.
+
+        The rig file of a session has no faults.
+        """
+        return not is_simulated(session.address)
 
     # choice and check of the rig
 

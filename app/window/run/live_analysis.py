@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
@@ -23,38 +25,55 @@ ANALYSES = {
 
 
 class LiveAnalysis(QWidget):
-    """Displacement against voltage, and spectra, of the newest samples; hidden at first."""
+    """Displacement against voltage, and spectra, of the newest samples; hidden at first.
+
+    A view is made when it is first shown.
+    """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self.loop = LoopPlot(session)
-        self.spectrum = SpectrumPlot(session)
-        self._views: dict[str, QWidget] = {"loop": self.loop, "spectrum": self.spectrum}
-        split = QSplitter(Qt.Orientation.Vertical)
-        split.setChildrenCollapsible(False)
-        for view in self._views.values():
-            split.addWidget(view)
-            view.hide()
+        self._split = QSplitter(Qt.Orientation.Vertical)
+        self._split.setChildrenCollapsible(False)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
-        outer.addWidget(split)
+        outer.addWidget(self._split)
         self.hide()
+
+    @cached_property
+    def loop(self) -> LoopPlot:
+        """Displacement against voltage, above the spectra."""
+        made = LoopPlot(self._session)
+        made.hide()
+        self._split.insertWidget(0, made)
+        return made
+
+    @cached_property
+    def spectrum(self) -> SpectrumPlot:
+        """Spectra of displacement and residual."""
+        made = SpectrumPlot(self._session)
+        made.hide()
+        self._split.addWidget(made)
+        return made
 
     @property
     def shown(self) -> tuple[str, ...]:
         """Names of the views that are shown."""
-        return tuple(name for name, view in self._views.items() if not view.isHidden())
+        made = vars(self)  # only a view that was made is in it
+        return tuple(name for name in ANALYSES if name in made and not made[name].isHidden())
 
     def show_view(self, name: str, shown: bool) -> None:
         """Show or hide a view of ``ANALYSES``."""
-        self._views[name].setVisible(shown)
+        view = self.loop if name == "loop" else self.spectrum
+        view.setVisible(shown)
         self.setVisible(bool(self.shown))
 
     def clear(self) -> None:
         """Show no run."""
-        self.loop.show_loops(())
-        self.spectrum.show_densities(())
+        if "loop" in vars(self):
+            self.loop.show_loops(())
+        if "spectrum" in vars(self):
+            self.spectrum.show_densities(())
 
     def draw(self, live: Live, seconds: float | None) -> None:
         """Draw the newest ``seconds`` s of the run, None for all, as far as they are kept."""

@@ -17,9 +17,9 @@ __all__ = ["Page", "Pages"]
 class Page(QWidget):
     """A page of the main window, which connects the signals below when it makes the page.
 
-    ``title`` stands in the list of pages. A page that is not ``at_start`` is made when it is first
-    needed. ``edits`` is what the page edits as a text file ("rig file"): unsaved changes of it are
-    restored by ``restore``.
+    ``title`` stands in the list of pages. A page that is not ``at_start``, or not ``needed`` then,
+    is made when it is first shown. ``edits`` is what the page edits as a text file ("rig file"):
+    unsaved changes of it are restored by ``restore``.
     """
 
     title: ClassVar[str]
@@ -40,6 +40,11 @@ class Page(QWidget):
     def make(cls, session: Session, pages: Pages) -> Self:  # noqa: ARG003
         """Return the page; a page that needs others takes them from ``pages``."""
         return cls(session)
+
+    @classmethod
+    def needed(cls, session: Session) -> bool:  # noqa: ARG003
+        """Return whether the page is made with the window."""
+        return cls.at_start
 
     @Slot()
     def reset_layout(self) -> None:

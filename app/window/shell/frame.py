@@ -90,7 +90,7 @@ class MainWindow(QMainWindow):
         self.run_page = self.page(RunPage)
         self.sequence_page = self.page(SequencePage)
         for kind in PAGES:
-            if kind.at_start:
+            if kind.needed(session):
                 self.page(kind)
         self.stop_keys = StopKeys(self._stop_by_key, lambda: session.busy, self)
         self._build()

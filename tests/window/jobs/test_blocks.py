@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtWidgets import QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from dearig.window.high_voltage.state import HighVoltage
 from dearig.window.rig.page import RigPage
+from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 
 
@@ -39,6 +42,16 @@ def test_a_block_disarms_a_rig_that_is_armed(window: MainWindow) -> None:
     window.session.block("draft", "segment 2 is not complete")
     assert page.runner.state is not HighVoltage.ARMED
     assert not page.start_button.isEnabled()
+
+
+def test_a_wrong_name_of_a_card_blocks_arming_before_the_page_rig_is_shown(
+    session: Session, keep: Callable[[QWidget], None]
+) -> None:
+    assert not RigPage.needed(session)  # a simulated rig has no name of a card
+    session.set_address("daqmx:Dev1/ao0")
+    keep(shown := MainWindow(session))
+    assert "is not the address of a card" in session.blocks["rig address"].sentence
+    assert not shown.run_page.arm_button.isEnabled()
 
 
 def test_a_banner_stays_until_it_is_hidden(window: MainWindow) -> None:
