@@ -115,7 +115,8 @@ def prepare_plots() -> None:
 
 def apply(application: QApplication, theme: Theme) -> None:
     """Use ``theme`` for the whole application."""
-    if not application.styleSheet():
+    # a style makes Qt restyle all widgets, even where it is the one that is used
+    if not application.styleSheet() and application.style().name() != "fusion":
         application.setStyle("Fusion")
     palette = QPalette()
     roles = QPalette.ColorRole
