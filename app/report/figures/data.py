@@ -23,7 +23,7 @@ __all__ = ["Column", "csv_url", "figure_columns", "to_csv"]
 Column = tuple[str, Sequence[object]]
 
 #: Digits of numbers: more than a figure shows, and a time of days to the millisecond.
-_DIGITS = 9
+_NUMBER = "%.9g"
 
 
 def figure_columns(figure: Figure) -> tuple[Column, ...]:
@@ -62,12 +62,14 @@ def csv_url(text: str) -> str:
 
     The file begins with a byte order mark, by which spreadsheets know its encoding.
     """
-    return "data:text/csv;charset=utf-8," + quote(f"\N{BYTE ORDER MARK}{text}", safe=",.-+:()/")
+    # line by line: one that has numbers only is taken as it is, and not byte by byte
+    lines = (quote(line, safe=",.-+:()/") for line in f"\N{BYTE ORDER MARK}{text}".split("\r\n"))
+    return "data:text/csv;charset=utf-8," + "%0D%0A".join(lines)
 
 
 def _cell(value: object) -> str:
     if isinstance(value, float | int):
-        return "" if math.isnan(value) else f"{value:.{_DIGITS}g}"
+        return "" if math.isnan(value) else _NUMBER % value
     # all text is in quotes: a semicolon in it divides cells where the comma is the decimal sign
     text = no_formula(printable(str(value))).replace('"', '""')
     return f'"{text}"'
