@@ -31,8 +31,8 @@ def item(parent: h5py.Group, name: str, stored: bool = True) -> h5py.Group | h5p
     link = parent.get(name, getlink=True)
     if link is None:
         return None
-    where = f"{parent.name.rstrip('/')}/{name}"
     if not isinstance(link, h5py.HardLink):
+        where = f"{parent.name.rstrip('/')}/{name}"
         raise Refused(f"{where} is a link, and links are not followed")
     return checked(parent[name], stored)
 

@@ -72,11 +72,12 @@ class Arrays:
 
     def load(self, names: Iterable[str]) -> None:
         """Read all values of ``names`` and keep them; the file is opened once."""
+        self._of_entry(lambda entry: self.load_from(entry, names))
 
-        def whole(entry: h5py.Group) -> dict[str, np.ndarray]:
-            return {name: self._cut(entry, name, 0, self.samples) for name in names}
-
-        for name, values in self._of_entry(whole).items():
+    def load_from(self, entry: h5py.Group, names: Iterable[str]) -> None:
+        """Read all values of ``names`` in ``entry``, that of this recording, and keep them."""
+        for name in names:
+            values = self._cut(entry, name, 0, self.samples)
             if name in self.stored:
                 self._check(name, values)
             values.setflags(write=False)

@@ -35,10 +35,9 @@ from dearig.recording.content.safe import dataset, group, item
 from dearig.recording.content.sample import read_film, read_load
 from dearig.recording.content.text import text_of
 from dearig.recording.files import old_of
-from dearig.recording.lock import ReplacedError
 from dearig.recording.reading.arrays import Arrays
 from dearig.recording.reading.environment import read_environment
-from dearig.recording.reading.opening import LOOKS, identifier_of, opened, read_from
+from dearig.recording.reading.opening import identifier_of, opened, read_from
 from dearig.recording.reading.recording import RecordedEvent, Recording
 
 __all__ = ["is_finished", "open_recording", "opened", "read_events"]
@@ -54,17 +53,14 @@ def open_recording(path: str | Path) -> Recording:
     Raises ``InputError`` for every file that is not a valid recording; it says what and where.
     """
     path = Path(path)
-    for left in reversed(range(LOOKS)):
-        recording = read_from(path, lambda file: _Reader(path, file).read())
+
+    def look(file: h5py.File) -> Recording:
+        recording = _Reader(path, file).read()
         if recording.samples <= EAGER:
-            try:
-                recording.arrays.load(recording.arrays.stored)
-            except ReplacedError:
-                if left:
-                    continue
-                raise
-        break
-    return recording
+            recording.arrays.load_from(file["entry"], recording.arrays.stored)
+        return recording
+
+    return read_from(path, look)
 
 
 def is_finished(path: Path) -> bool:
