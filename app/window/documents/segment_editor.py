@@ -238,7 +238,7 @@ class SequenceEditor(QWidget):
         played = iter(durations)
         for row in range(len(self.draft.segments)):
             total = sum(next(played) for _ in range(self._repeats(row)))
-            self._set_duration(row, f"{total:.3g}")
+            self._set_duration(row, f"{total:.3g}" if total < 999.5 else f"{total:.0f}")
 
     def clear_duration(self, row: int | None) -> None:
         """Show no duration for the segment in ``row``, which cannot be played."""

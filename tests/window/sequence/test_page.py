@@ -310,6 +310,10 @@ def test_unsaved_changes_are_named_before_another_sequence_is_taken(
     answers.next = True
     page.preset("thesis")
     assert page.draft.toml == PRESETS["thesis"]
+    segments = len(page.draft.segments)
+    page.editor.show_durations([2000.0] * 100)
+    shown = [page.editor.table.item(row, 3).text() for row in range(segments)]
+    assert all(float(text) % 2000.0 == 0.0 and "e" not in text for text in shown)
     page.editor.undo()
     assert page.draft.toml == changed
 
