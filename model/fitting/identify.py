@@ -346,9 +346,9 @@ def _prior_p(problem: Problem, fit: LocalFit, held_limits: Sequence[str]) -> flo
 def _farthest(layout: FitLayout, rows: np.ndarray) -> str:
     """Return the parameter that is farthest from its prior, and by how much."""
     most = int(np.argmax(np.abs(rows)))
-    return (
-        f"{layout.names[layout.priors[most]]}, by {abs(rows[most]):.2g} of its standard deviations"
-    )
+    far = float(abs(rows[most]))
+    number = f"{far:.2g}" if far < 9.95 else f"{far:.0f}"  # "1.6e+02" is hard to read
+    return f"{layout.names[layout.priors[most]]}, by {number} of its standard deviations"
 
 
 def _misfit_p(problem: Problem, residuals: np.ndarray) -> float | None:

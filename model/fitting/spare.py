@@ -11,6 +11,7 @@ it gains more than noise alone would at the best of these places.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -45,6 +46,7 @@ __all__ = [
 
 #: Note of a parameter of a branch that may be two, or none.
 SPARE = "only the sum of several branches is determined"
+_MODULUS = re.compile(r"mu_\d+")
 _ITERATIONS = 60  # of a descent into another valley
 _GAIN = 0.01  # of the threshold of an interval, at which it ends
 _FAST, _SLOW = -1, 0  # sites of a branch that is as fast or as slow as the records resolve
@@ -448,25 +450,28 @@ def _sum(found: Valleys, branch: int, span: Span) -> Estimate:
     here = [branch, *found.beside(branch, _sites(found, best.x))]
     ever = {branch, *(b for sites in found.points for b in found.beside(branch, sites))}
     total = float(sum(values[_columns(layout, b)["mu", 0]] for b in here))
-    only = "" if ever == {*here} else f"; here {' and '.join(f'mu_{b}' for b in sorted(here))}"
-    return _together(ever, total, span, f"about {values[_time(layout, branch)]:.3g}", only)
+    when = f"about {values[_time(layout, branch)]:.3g}"
+    return _together(here, total, span, when, ever.difference(here))
 
 
 def _together(
-    branches: Collection[int], total: float, span: Span, when: str, only: str = ""
+    branches: Collection[int], total: float, span: Span, when: str, others: Collection[int] = ()
 ) -> Estimate:
     """Return the estimate of ``total`` Pa, the modulus of ``branches`` that relax at ``when``.
 
-    ``only`` says which of them do so in the reported fit, where not all do.
+    ``others`` do so in fits that are as good, not in the reported one. The name has them in
+    brackets, because the total is not the sum of their values too.
     """
-    return Estimate(
-        " + ".join(f"mu_{b}" for b in sorted(branches)),
-        "Pa",
-        total,
-        *span,
-        is_determined(*span),
-        f"all branches that relax at {when} s together{only}",
-    )
+    name, note = _sum_of(branches), f"all branches that relax at {when} s together"
+    if others:
+        name = f"{name} (+ {_sum_of(others)})"
+        verb = "does" if len(others) == 1 else "do"
+        note = f"{note}; in other fits that are as good, {_sum_of(others)} {verb} so too"
+    return Estimate(name, "Pa", total, *span, is_determined(*span), note)
+
+
+def _sum_of(branches: Collection[int]) -> str:
+    return " + ".join(f"mu_{b}" for b in sorted(branches))
 
 
 def sums_of_weak(
@@ -485,7 +490,7 @@ def sums_of_weak(
     """
     layout = best.problem.layout
     values, known = layout.values(best.x), {e.name: e for e in estimates}
-    told = {part for one in sums for part in one.name.split(" + ")}
+    told = {part for one in sums for part in _MODULUS.findall(one.name)}
     groups: list[list[int]] = [[]]
     times = {q.index: values[j] for j, q in enumerate(layout.quantities) if q.kind == "T"}
     for branch in sorted(times, key=times.__getitem__):

@@ -153,8 +153,11 @@ def _undetermined(said: Said) -> Iterator[str]:
     if every and weak:
         yield f"every parameter is said to be determined, and {weak[0]['name']} is not"
     for total in said.json.get("sums", ()):
-        parts = total["name"].split(" + ")
+        parts = total["name"].split(" (+ ")[0].split(" + ")  # in brackets: in other fits
         known = {p["name"]: p["determined"] for p in said.json["parameters"]}
+        values = {p["name"]: p["value"] for p in said.json["parameters"]}
+        if not math.isclose(total["value"], sum(values[part] for part in parts), rel_tol=1e-9):
+            yield f"the sum {total['name']} is {total['value']:.6g}, its parts {values}"
         if not total["determined"]:
             yield f"the sum {total['name']} is said to be determined, and is not"
         if all(known.get(part, False) for part in parts):

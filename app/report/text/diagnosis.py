@@ -11,7 +11,7 @@ from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
 from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, TOLERANCE
 from dearig.report.text.excitation import tested_texts, undetermined_texts
 from dearig.report.text.laws import place_text
-from dearig.report.text.numbers import significant, symbol
+from dearig.report.text.numbers import significant, symbol, with_symbols
 from dearig.report.text.sentences import few_data_text, listed, undetermined_names_text
 from dearig.units import SHOWN, readable
 
@@ -479,7 +479,8 @@ def _sentence(text: str) -> str:
 def warnings(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     """Return the warnings about recordings and search, without duplicates."""
     said = [outcome.assumed] if outcome.assumed else []
-    said += [*outcome.quality, *(w[:1].upper() + w[1:] for w in outcome.finding.notes)]
+    notes = (w[:1].upper() + w[1:] for w in outcome.finding.notes)
+    said += [*outcome.quality, *map(with_symbols, notes)]
     for comparison in (*outcome.after.train, *outcome.after.validation):
         said += [f"{comparison.name}: {w}" for w in comparison.warnings]
     return tuple(dict.fromkeys(readable(_sentence(w)) for w in said))

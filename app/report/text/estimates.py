@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dearig.report.text.numbers import NO_VALUE, quoted, symbol
+from dearig.report.text.numbers import NO_VALUE, quoted, symbol, with_symbols
 from dearig.report.text.tables import (
     BOUND_MARK,
     BRACKETS_TEXT,
@@ -105,7 +105,8 @@ def _estimates(
 
 def _note(e: Estimate) -> str:
     """Return the note of an estimate, with what was stated of it before the fit."""
-    return "; ".join(filter(None, ("" if e.is_fixed else e.note, stated_text(e))))
+    said = ("" if e.is_fixed else e.note, stated_text(e))
+    return with_symbols("; ".join(filter(None, said)))
 
 
 def _estimate(e: Estimate, name: str, detail: str, with_budget: bool) -> Row:

@@ -17,6 +17,7 @@ __all__ = [
     "significant",
     "symbol",
     "to_ascii",
+    "with_symbols",
 ]
 
 #: Text in place of a missing number.
@@ -45,6 +46,8 @@ _PLAIN = str.maketrans(
     }
 )
 _NAMED = re.compile(r"(mu|alpha|beta|share|c2|c3|J|T)_(\d+)")
+# not a key such as mu_1_kPa, and not a part of a file's name
+_NAME_IN_TEXT = re.compile(r"(?<![\w./-])(mu|alpha|beta|J|T)_(\d+)(?![\w-]|\.\w)")
 _DIGITS_MAX = 12  # significant digits of a value: a fit in double precision supports no more
 _PLAIN_FROM, _PLAIN_TO = 1e-4, 1e6  # numbers outside are written with a power of ten
 _WIDE = 5.0  # ratio of its ends above which an interval gives no digits
@@ -143,11 +146,18 @@ def seconds(duration: float) -> str:
 
 def symbol(name: str) -> str:
     """Return the symbol of a parameter, or of a sum: mu_0 becomes a letter with a subscript."""
-    if " + " in name:
-        return " + ".join(map(symbol, name.split(" + ")))
+    if "+ " in name:  # of a sum, with those in brackets that belong to it in other fits
+        return _NAMED.sub(_symbol, name)
     match = _NAMED.fullmatch(name)
-    if match is None:
-        return name
+    return name if match is None else _symbol(match)
+
+
+def with_symbols(text: str) -> str:
+    """Return a ``text`` in which names of parameters are their symbols, as tables have them."""
+    return _NAME_IN_TEXT.sub(_symbol, text)
+
+
+def _symbol(match: re.Match[str]) -> str:
     letter = "\N{GREEK SMALL LETTER MU}" if match[1] == "mu" else match[1]
     return letter + match[2].translate(_SUBSCRIPT)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise, pooled_rms
 from dearig.model.readings.noise import LEAD_IN
 from dearig.model.verdict import is_rejected, p_text, smallest_p
-from dearig.report.text.numbers import seconds, significant, symbol
+from dearig.report.text.numbers import seconds, significant, symbol, with_symbols
 from dearig.report.text.thesis import SIMULATED_CAVEAT
 from dearig.units import SHOWN
 
@@ -220,7 +220,7 @@ def undetermined_names_text(names: Iterable[str]) -> str:
 def warnings_of(outcome: IdentifyOutcome | ValidateOutcome) -> tuple[str, ...]:
     """Return all warnings without duplicates; those of a recording begin with its name."""
     fit = getattr(outcome, "fit", None)
-    said = [_begun(w) for w in fit.warnings] if fit is not None else []
+    said = [with_symbols(_begun(w)) for w in fit.warnings] if fit is not None else []
     if fit is not None:
         comparisons = (*getattr(outcome, "train", ()), *getattr(outcome, "validation", ()))
     else:

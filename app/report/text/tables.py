@@ -7,7 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dearig.report.text.numbers import NO_VALUE, interval, quoted, significant, symbol
+from dearig.report.text.numbers import (
+    NO_VALUE,
+    interval,
+    quoted,
+    significant,
+    symbol,
+    with_symbols,
+)
 from dearig.report.text.sentences import spring_label
 from dearig.report.text.thesis import SIMULATED_CAVEAT, table_3
 from dearig.units import SHOWN, parameter_unit
@@ -256,7 +263,8 @@ def parameter_table(fit: Identification, rejected: bool = False) -> Table:
             cells.append(significant(theirs * factor, 4))
         # without intervals all notes are the same, and the page shows it once
         details = [stated_text(e)] if e.is_fixed or not known else [e.note, stated_text(e)]
-        rows.append(Row(tuple(cells), "; ".join(filter(None, details)), known and not e.determined))
+        detail = with_symbols("; ".join(filter(None, details)))
+        rows.append(Row(tuple(cells), detail, known and not e.determined))
     interval_head = ("95 % interval", "if right" if rejected and known else "")
     head = [("", ""), ("Value", ""), ("Unit", ""), interval_head]
     if fit.budget:

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from dearig.model.errors import ModelError
 from dearig.model.film.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from dearig.model.fitting import Constraint, GivenValue, identify, with_budget
 from dearig.model.fitting.estimates import AT_STATED_BOUND
+from dearig.model.fitting.identify import _farthest
 from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
 from dearig.model.readings.records import FilmRecord
@@ -338,3 +340,9 @@ def test_constraints_of_parameters_that_the_model_lacks_have_no_part():
     layout = FitLayout(PLAIN, constraints=[Constraint("T_3", fixed=1.0)])
     assert not layout.fixed.any()
     assert np.array_equal(layout.lower, FitLayout(PLAIN).lower)
+
+
+def test_far_from_a_prior_is_a_plain_number():
+    layout = SimpleNamespace(names=("mu_0",), priors=[0])
+    told = [_farthest(layout, np.array([far])) for far in (-1.64, 164.2)]
+    assert told == [f"mu_0, by {n} of its standard deviations" for n in ("1.6", "164")]

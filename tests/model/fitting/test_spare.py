@@ -10,8 +10,10 @@ import pytest
 
 from dearig.model.film.material import Network
 from dearig.model.fitting import Estimate, Identification, identify
+from dearig.model.fitting.spare import _together
 from dearig.report.as_json import outcome_json
 from dearig.report.text.estimates import estimate_table
+from dearig.report.text.numbers import symbol
 from dearig.report.text.tables import parameter_table
 from tests.deep import mostly_deep
 from tests.tools.diagnosis import stage
@@ -70,6 +72,15 @@ def test_tables_and_json_have_the_sum() -> None:
     outcome = identify_outcome()
     (said,) = outcome_json(replace(outcome, fit=replace(outcome.fit, sums=(total,))))["sums"]
     assert (said["name"], said["ci95"]) == ("mu_1 + mu_2", [104.4e3, 104.6e3])
+
+
+def test_the_name_of_a_sum_says_which_values_it_is_the_sum_of() -> None:
+    total = _together([1, 2], 99e3, (91e3, 113e3), "about 0.341", {3})
+    assert total.name == "mu_1 + mu_2 (+ mu_3)"
+    assert total.note.endswith("in other fits that are as good, mu_3 does so too")
+    (row,) = parameter_table(replace(paper_fit(), estimates=(), sums=(total,))).rows
+    assert row.cells[0] == " + ".join((symbol("mu_1"), symbol("mu_2"))) + f" (+ {symbol('mu_3')})"
+    assert row.detail.endswith(f"{symbol('mu_3')} does so too")
 
 
 def test_branches_that_the_data_keep_apart_make_no_sum() -> None:

@@ -363,6 +363,12 @@ class TestWords:
             == "The data determine every parameter."
         )
 
+    def test_warnings_have_the_symbols_of_the_tables(self):
+        told = ("these data determine mu_1 + mu_2, not the parts; see mu_1_kPa in mu_1.toml",)
+        said = warnings_of(identify_outcome(fit=fit(warnings=told)))
+        both = " + ".join(map(symbol, ("mu_1", "mu_2")))
+        assert f"determine {both}, not the parts; see mu_1_kPa in mu_1.toml." in said[0]
+
     def test_warnings_come_once_with_their_recording(self):
         train = actuator_comparison(warnings=("the laser lost its target", "it was warm."))
         said = warnings_of(identify_outcome(train=(train, train)))
