@@ -127,6 +127,7 @@ def headline(outcome: DiagnoseOutcome) -> str:
     return "; ".join([said or HEADLINES[judgement.verdict], *limits])
 
 
+_LIKELY = 0.5  # probability below which a family that is named is more likely not missing
 _NOT_EXCLUDED = 0.1  # probability from which on a family that is not named is mentioned
 
 _STATUS = {
@@ -388,6 +389,11 @@ def _sureness(outcome: DiagnoseOutcome) -> list[str]:
     known, families = outcome.marginals, dict.fromkeys(s.family for s in outcome.finding.steps)
     text = "The probability that {} is among what is missing is {:.2f}."
     said = [text.format(family_label(f), known.get(f, 0.0)) for f in families if known]
+    counted = known != dict(outcome.finding.marginals)
+    if counted and any(known.get(f, 0.0) < _LIKELY for f in families):
+        said.append("Validation recordings, which do not confirm what was found, count in this.")
+    if families and (other := known.get("unknown", 0.0)) >= _NOT_EXCLUDED:
+        said.append(f"The probability that an effect of no known family is missing is {other:.2f}.")
     others = [
         f"{family_label(f)} ({p:.2f})"
         for f, p in known.items()

@@ -37,6 +37,18 @@ def test_a_name_stands_next_to_its_small_probability() -> None:
     assert "that sensor lag is among what is missing is 0.00" in said
 
 
+def test_a_name_that_validation_makes_improbable_says_so_and_what_is_probable_instead() -> None:
+    certain = diagnose_outcome(finding=finding(marginals=(("sensor_lag", 1.0),)))
+    no_better = replace(certain.after, validation=certain.before.validation)
+    outcome = replace(certain, stands=(certain.before, no_better))
+    assert outcome.marginals["sensor_lag"] < 0.01
+    said = " ".join(summary(outcome))
+    assert "that sensor lag is among what is missing is 0.00" in said
+    assert "Validation recordings, which do not confirm what was found, count in this." in said
+    assert "that an effect of no known family is missing is 1.00" in said
+    assert "no known family" not in " ".join(summary(certain))
+
+
 def test_what_the_search_did_not_say_is_null_and_not_said() -> None:
     outcome = diagnose_outcome(finding=finding(families=(("sensor_lag", 1.0),)))
     assert diagnosis_json(outcome)["families"][0]["probability_missing"] is None
