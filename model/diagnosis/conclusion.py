@@ -513,7 +513,10 @@ def _round(race: Race, found: SearchResult, fitter: Fitter) -> Round:
     added = sorted(race.taken.members - parent.members) if race.taken is not None else []
     chosen = added[0] if len(added) == 1 else None
     if added:
-        reason = f"{' and '.join(added)} {'explains' if len(added) == 1 else 'explain'} most"
+        # a candidate with more parameters can explain a little more, and be less probable
+        reason = (
+            f"{' and '.join(added)} {'is' if len(added) == 1 else 'together are'} most probable"
+        )
     else:
         reason = _why_none(race, found)
     return Round(parent.effects, tuple(candidates), chosen, reason)

@@ -164,7 +164,7 @@ def step_table(outcome: DiagnoseOutcome) -> Table:
 _VERDICTS = {
     "chosen": "chosen",
     "indistinguishable": "not separable",
-    "better": "explains less",
+    "better": "less probable",
     "worthless": "no better than chance",
     "failed": "fit failed",
     "denied": "denied by a channel",

@@ -377,7 +377,7 @@ class TestTables:
         kept = ("sensor lag",)
         whole, brief = ranking_table(ROUND, kept), ranking_table(ROUND, kept, 3)
         assert len(whole.rows) == len(ROUND.candidates)
-        assert [r.cells[-1] for r in brief.rows] == ["chosen", "not separable", "explains less"]
+        assert [r.cells[-1] for r in brief.rows] == ["chosen", "not separable", "less probable"]
         assert "9 more candidates are worse" in brief.note
         assert whole.rows[0].detail == ROUND.candidates[0].note
         assert [r.mark for r in brief.rows] == [True, False, False]
