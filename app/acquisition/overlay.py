@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.drivers.channels import Channel
+from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block
 from dearig.model import kernel
 from dearig.model.circuit import loop
@@ -43,6 +44,19 @@ class OverlayModel:
     actuator: Actuator
     path: Path | None = None
     toml: str = ""
+
+    def compile(self) -> None:
+        """Compile the kernels that an ``Overlay`` of this model calls, unless they are.
+
+        A first use takes minutes. During a run it would hold up the thread that writes the
+        recording, until no more samples fit into memory. A model without a rest state is left to
+        the ``Overlay``, which says what is wrong.
+        """
+        channel = Channel("voltage_command", "V", Scaling((0.0, 1.0), 1.0))
+        with contextlib.suppress(ModelError):
+            overlay = Overlay(self.actuator, (channel,), rate=1000.0)
+            for start in (0, 2):  # the second block goes on from the first
+                overlay.advance(Block(start, np.zeros((1, 2), dtype=np.int16)))
 
 
 class Overlay:

@@ -146,6 +146,8 @@ def record(
             feedback, planned, rig_file, options.actuator, options.film_id, progress
         )
         waveform = loop.gate.waveform
+    if overlay is not None:
+        overlay.compile()
     rig = open_rig(address, rig_file, options)
     room = RoomOfRun(None, None)
     try:
@@ -503,14 +505,10 @@ class _Run:
             self._waiting_since, self._asked_before = self._clock(), asked
         elif self._clock() - self._waiting_since > _TELL_AFTER:
             self._waiting_since = math.inf
-            recorder = self._recorder
-            left = recorder.received - recorder.samples
-            what = f"{left} of {recorder.received} samples are" if left else "the file's end is"
             log.warning(
-                "the output is at 0 V; %s still being written to %s; press ctrl-C twice to stop "
-                "waiting for the disk",
-                what, recorder.path,
-            )  # fmt: skip
+                "the output is at 0 V; %s; press ctrl-C twice to stop waiting",
+                self._recorder.left_text,
+            )
         return asked - self._asked_before >= _GIVE_UP
 
     def _bring_to_zero(self, played: bool) -> None:

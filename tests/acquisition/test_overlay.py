@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dearig.acquisition.overlay import Overlay
+from dearig.acquisition import run
+from dearig.acquisition.overlay import Overlay, OverlayModel
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block
+from dearig.errors import InputError
 from dearig.model.circuit import loop
 from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.simulation.actuator import Actuator, Drive, at_rest
@@ -152,3 +157,27 @@ def test_a_thermometer_counts_from_the_first_second() -> None:
     difference = [warmed.advance(b) - steady.advance(b) for b in blocks]
     assert np.max(np.abs(np.concatenate(difference[:20]))) < 1e-7
     assert np.max(np.abs(difference[-1])) > 1e-5
+
+
+def test_an_overlay_model_is_compiled_before_an_instrument_is_touched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+    advance = Overlay.advance
+
+    def advanced(overlay: Overlay, block: Block) -> np.ndarray:
+        done.append("advanced")
+        return advance(overlay, block)
+
+    def opened(*_: object) -> None:
+        done.append("opened")
+        raise InputError("no further")
+
+    monkeypatch.setattr(Overlay, "advance", advanced)
+    monkeypatch.setattr(run, "open_rig", opened)
+    text = 'name = "x"\n[[segment]]\nkind = "hold"\nvoltage_kV = 0.0\nduration_s = 1.0\n'
+    loaded = parse_sequence(text, "the sequence", Path())
+    overlay = OverlayModel("x", THESIS)
+    with pytest.raises(InputError, match="no further"):
+        run.record(loaded, "sim", RigFile(), tmp_path / "run.h5", overlay=overlay)
+    assert done == ["advanced", "advanced", "opened"]

@@ -109,6 +109,7 @@ class Recorder:
         self._ended = False
         self._end_fault: BaseException | None = None
         self._given_up: DiskFault | None = None
+        self._modelling = False
         #: what is known of the rig's output after the run; kept with the recording by ``close``
         self.output_state: OutputState | None = None
         self._thread = threading.Thread(target=self._work, name=_THREAD, daemon=True)
@@ -138,6 +139,18 @@ class Recorder:
         writer = self._writer
         safe = writer.samples if self._given_up is None else writer.samples_flushed
         return writer.first_sample + safe
+
+    @property
+    def left_text(self) -> str:
+        """What the end of the recording waits for: the overlay model or the disk."""
+        left = self._received - self.samples
+        if self._modelling:
+            return (
+                f"the overlay model is still computed for {left} of {self._received} samples, "
+                f"which are then written to {self.path}"
+            )
+        what = f"{left} of {self._received} samples are" if left else "the file's end is"
+        return f"{what} still being written to {self.path}"
 
     def notices(self) -> list[Event]:
         """Return the events of the recording itself since the last call; it has them already."""
@@ -220,6 +233,11 @@ class Recorder:
     def _behind(self) -> str:
         rate = self._writer.rate_Hz
         late = self._bytes / (self._writer.count_bytes * self._writer.channels * rate)
+        if self._modelling:
+            return (
+                f"the overlay model is {late:.3g} s behind the run, and no more samples fit into "
+                f"memory: this computer is too slow for it; record without it, or at a lower rate"
+            )
         return (
             f"the disk of {self._writer.path.absolute().parent} is {late:.3g} s behind the run, "
             f"and no more samples fit into memory: it does not answer, or it is too slow; see that "
@@ -276,10 +294,13 @@ class Recorder:
             if given_up():
                 writer = self._writer
                 safe = writer.first_sample + writer.samples_flushed
+                last = f"the last {self._received - safe} of {self._received} samples"
+                what = f"the disk of {writer.path.absolute().parent} had not taken {last}"
+                if self._modelling:
+                    what = f"the overlay model had not been computed for {last}"
                 self._given_up = DiskFault(
-                    f"the disk of {writer.path.absolute().parent} had not taken the last "
-                    f"{self._received - safe} of {self._received} samples when the operator "
-                    f"stopped waiting for it; recover the file to finish it",
+                    f"{what} when the operator stopped waiting for it; recover the file to "
+                    f"finish it",
                     command=("recover", str(writer.path)),
                 )
                 raise self._given_up
@@ -316,7 +337,11 @@ class Recorder:
     def _write(self, item: Block | Event | _Room) -> None:
         modelled = None
         if isinstance(item, Block) and self._model is not None:
-            modelled = self._model(item)
+            self._modelling = True
+            try:
+                modelled = self._model(item)
+            finally:
+                self._modelling = False
         try:
             self._put(item, modelled)
         except LostFile as lost:

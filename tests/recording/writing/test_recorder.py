@@ -15,7 +15,7 @@ from dearig.drivers.rig import Block, Event
 from dearig.errors import DiskFault, InstrumentFault
 from dearig.recording import open_recording
 from dearig.recording.verify import verify
-from dearig.recording.writing.recorder import HOLDS, LAST_BLOCKS, Recorder, is_writing
+from dearig.recording.writing.recorder import HOLDS, LAST_BLOCKS, Recorder, _End, is_writing
 from dearig.recording.writing.writer import RecordingWriter
 from tests.tools.recordings import RATE, Clock, run_counts, writer
 
@@ -111,6 +111,36 @@ def test_the_operator_stops_waiting(tmp_path: Path, gate: threading.Event) -> No
     gate.set()
     recorder._thread.join()
     assert open_recording(tmp_path / "run.h5").outcome == "ended early"
+
+
+def test_an_overlay_model_that_is_late_is_not_called_a_disk(tmp_path: Path) -> None:
+    begun, opened = threading.Event(), threading.Event()
+
+    def model(block: Block) -> np.ndarray:
+        begun.set()
+        opened.wait()
+        return np.zeros(block.counts.shape[1])
+
+    made = writer(tmp_path / "run.h5")
+    made._overlay = True
+    recorder = Recorder(made, model=model)
+    try:
+        for block in blocks(1.0):
+            recorder.append(block)
+        begun.wait()
+        assert recorder.left_text == (
+            f"the overlay model is still computed for 1000 of 1000 samples, which are then written "
+            f"to {tmp_path / 'run.h5'}"
+        )
+        with pytest.raises(
+            DiskFault, match="overlay model had not been computed for the last 1000"
+        ):
+            recorder.drain(lambda: True)
+    finally:
+        opened.set()
+    recorder._end = _End("ended early", "", "warning")
+    recorder._thread.join()
+    assert "overlay model" not in recorder.left_text
 
 
 def test_what_is_written_and_not_flushed_does_not_count_then(
