@@ -25,6 +25,8 @@ def source_of(path: Path | str | None) -> str:
 def in_force(rig_file: RigFile, source: str) -> str:
     """Return a sentence with the scaling and the limits that apply, and their ``source``."""
     amplifier, limits, laser = rig_file.amplifier, rig_file.limits, rig_file.laser
+    if source == NO_RIG_FILE:
+        source = "the thesis's rig, as no rig file was given"
     return (
         f"scaling and limits are those of {source}: amplifier {amplifier.gain_V_per_V:g} V/V, "
         f"voltage monitor {amplifier.monitor_V_per_kV:g} V/kV, laser {laser.mm_per_V:g} mm/V, "

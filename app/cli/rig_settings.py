@@ -27,18 +27,27 @@ def rig_settings(path: Path | None) -> tuple[RigFile, str, dict[str, str]]:
 
 
 def announce_rig(
-    console: Console, rig: str, settings: RigFile, source: str, differing: Iterable[str] = ()
+    console: Console,
+    rig: str,
+    settings: RigFile,
+    source: str,
+    differing: Iterable[str] = (),
+    simulated: bool | None = None,
 ) -> None:
-    """Print the scaling and the limits of a run on a ``rig`` that is not simulated.
+    """Print watchdog, scaling and limits of runs on a ``rig`` that is not simulated.
 
-    ``differing`` are sentences on what differs from them elsewhere, such as in a recording. Raises
+    ``differing`` are sentences on what differs from them elsewhere, such as in a recording;
+    ``simulated`` is what the card reports of itself, None before it was asked. Raises
     ``InputError`` for a rig that is not known.
     """
     from dearig.acquisition.rig_source import in_force
     from dearig.acquisition.rigs import kind_of
+    from dearig.drivers.daqmx.watchdog import watchdog_text
 
     if kind_of(rig).simulated:
         return
+    if rig.startswith("daqmx:"):
+        print_line(console, f"hardware watchdog: {watchdog_text(settings.card, simulated)}")
     print_line(console, in_force(settings, source))
     for sentence in differing:
         print_line(console, sentence, "yellow")

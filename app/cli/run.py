@@ -200,14 +200,11 @@ def _announcer(
 ) -> RunObserver:
     """Return an observer that says, before a run, what applies on a rig that is not simulated."""
     from dearig.acquisition.run import RunObserver
-    from dearig.drivers.daqmx.watchdog import watchdog_text
 
     class Announcer(RunObserver):
         def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:  # noqa: ARG002
-            if identity.address.startswith("daqmx:"):
-                words = watchdog_text(settings.card, identity.simulated)
-                print_line(console, f"hardware watchdog: {words}")
-            announce_rig(console, identity.address, settings, source, differing)
+            at, simulated = identity.address, identity.simulated
+            announce_rig(console, at, settings, source, differing, simulated)
 
     return Announcer()
 

@@ -6,7 +6,7 @@ from io import StringIO
 
 from rich.console import Console
 
-from dearig.acquisition.rig_source import film_differences, source_of
+from dearig.acquisition.rig_source import film_differences, in_force, source_of
 from dearig.analysis.tracking import misfits_of
 from dearig.cli.rig_settings import announce_rig
 from dearig.config.rigfile import RigFile
@@ -26,6 +26,12 @@ def test_a_model_of_another_film_does_not_change_whose_gain_applies() -> None:
     announce_rig(Console(file=said, width=1000), "daqmx:Dev1", ours, source_of("lab.toml"), other)
     assert "those of rig file lab.toml: amplifier 900 V/V" in said.getvalue()
     assert "width: 0.072 in the model" in said.getvalue()
+    assert "hardware watchdog: not wired" in said.getvalue()
+
+
+def test_without_a_rig_file_the_rig_of_the_thesis_is_named() -> None:
+    said = in_force(RigFile(), source_of(None))
+    assert said.startswith("scaling and limits are those of the thesis's rig, as no rig file was")
 
 
 def test_the_page_and_the_results_say_it_too() -> None:
