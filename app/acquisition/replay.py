@@ -66,12 +66,12 @@ class Original:
                 f"give the rig's own file",
                 option="rig_file",
             )
-        if not self.configuration:
-            return (f"{self.path} holds no rig file, so nothing was compared",)
+        # without a rig file a run has the scaling and the limits of the thesis's rig
+        mine = "" if self.configuration else ": none, which is the thesis's rig"
         found = differences(self.rig_file, settings)
         if not found:
-            return (f"{self.path} was recorded with the same rig file",)
-        return (f"{self.path} was recorded with another rig file; what differs:", *found)
+            return (f"{self.path} was recorded with the same settings of the rig",)
+        return (f"{self.path} was recorded with another rig file{mine}; what differs:", *found)
 
     def check_film(self, rig_file: RigFile, model: Path | None) -> None:
         """Raise ``InputError`` unless film and load of ``rig_file`` are those of the original.

@@ -9,6 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
+from dearig.acquisition.replay import original_of
+from dearig.config.rigfile import load_rig_file
 from dearig.recording import RunMetadata, open_recording, save_recording
 from tests.tools.command import LOBE, SLOW_RIG, dearig, done, refused, thesis_model, write
 from tests.tools.daqmx import served
@@ -151,3 +153,14 @@ def test_seed_zero_is_a_seed(tmp_path: Path) -> None:
     assert [open_recording(p).provenance["seed"] for p in (zero, again)] == [0, 5]
     assert open_recording(again).provenance["configuration_from"] == f"the rig file in {first}"
     assert open_recording(first).provenance["configuration_from"] == f"rig file {rig}"
+
+
+def test_a_recording_without_a_rig_file_is_compared_with_the_rig_of_the_thesis(
+    tmp_path: Path,
+) -> None:
+    run, other = tmp_path / "run.h5", write(tmp_path / "other.toml", OTHER_RIG)
+    done("record", write(tmp_path / "lobe.toml", LOBE), "--out", run)
+    told = original_of(run).differences("daqmx:Dev1", other, load_rig_file(other))
+    assert "another rig file: none, which is the thesis's rig; what differs:" in told[0]
+    assert "amplifier.gain_V_per_V: 1000 in the recording, 500 here" in told
+    assert "limits.voltage_max_kV: 8.5 in the recording, 4.9 here" in told
