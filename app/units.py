@@ -16,6 +16,7 @@ __all__ = [
     "parameter_key",
     "parameter_unit",
     "readable",
+    "runs_text",
 ]
 
 #: A number of thousands that was rounded to a few digits; no part of a name.
@@ -148,3 +149,11 @@ def name_and_unit(key: str) -> tuple[str, str]:
         if stem.endswith(f"_{ending}") and stem != "unit_per_V":  # the unit is another key's
             return stem.removesuffix(f"_{ending}").replace("_", " ") + of, _KEY_UNITS[ending]
     return key.replace("_", " "), ""
+
+
+def runs_text(count: int, verb: str = "") -> str:
+    """Return a number of runs in words; with ``verb`` "is" or "are" follows it."""
+    one = count == 1
+    return f"{count:,} run{'' if one else 's'}" + (
+        f" {'is' if one else 'are'} {verb}" if verb else ""
+    )

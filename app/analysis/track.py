@@ -24,6 +24,7 @@ from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
 from dearig.recording.reading.reader import open_recording
 from dearig.recording.result_folder import result_folder
+from dearig.units import runs_text
 
 __all__ = ["track"]
 
@@ -83,7 +84,8 @@ def track(
             stopped = error
         else:
             stopped = Interrupted(
-                f"interrupted between two runs, at 0 V; {len(tracking.runs)} runs are in {folder}"
+                f"interrupted between two runs, at 0 V; "
+                f"{runs_text(len(tracking.runs), 'in')} {folder}"
             )
         status = "interrupted" if isinstance(stopped, Interrupted) else "stopped"
         if isinstance(stopped, InputError) and not tracking.runs:

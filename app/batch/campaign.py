@@ -50,6 +50,7 @@ from dearig.recording.files import write_whole
 from dearig.recording.reading.opening import read_from
 from dearig.recording.reading.reader import open_recording
 from dearig.recording.recover import recover
+from dearig.units import runs_text
 
 __all__ = ["Arming", "CampaignOutcome", "Noted", "play_campaign"]
 
@@ -150,7 +151,7 @@ def play_campaign(
         except (KeyboardInterrupt, Interrupted):
             left = len(session.queue.waiting) + (session.queue.running is not None)
             stop = Interrupted(
-                f"interrupted between two runs, at 0 V; {left} runs are left; "
+                f"interrupted between two runs, at 0 V; {runs_text(left, 'left')}; "
                 f"continue the campaign",
                 option="resume",
             )
@@ -382,7 +383,7 @@ class _Session:
             if not queue.waiting:
                 return "complete", "", None
             if queue.ending:
-                return "ended", f"ended on request; {len(queue.waiting)} runs are left", None
+                return "ended", f"ended on request; {runs_text(len(queue.waiting), 'left')}", None
             run = queue.waiting[0]
             if queue.armed_runs is not None and queue.armed_runs <= 0:
                 return "armed_runs", self._left("the armed number of runs was played"), None
@@ -401,7 +402,7 @@ class _Session:
                 return ended
 
     def _left(self, why: str) -> str:
-        return f"{why}; {len(self.queue.waiting)} runs are left: arm them to continue"
+        return f"{why}; {runs_text(len(self.queue.waiting), 'left')}: arm the rig to continue"
 
     def _of_run(self, state: RunState) -> Progress:
         """Return a progress that says which run of how many it is."""

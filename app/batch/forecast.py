@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dearig.acquisition.plan import Plan, plan
 from dearig.config.campaignfile import Campaign, digest_of
+from dearig.config.modelfile import load_model
 from dearig.config.rigfile import RigFile
 from dearig.drivers.gate import Margin
 from dearig.errors import InputError
@@ -62,7 +63,9 @@ def foresee(
     found = survey(campaign, rig_file, folder, model, film, progress, whole=False)
     for run, reason in zip(campaign.runs, found.refused, strict=False):
         if reason:
-            raise InputError(f"run {run.name}: {reason}")
+            # a fault of the plan names the run itself
+            own = reason.startswith(campaign.source)
+            raise InputError(reason if own else f"run {run.name}: {reason}")
     return found
 
 
@@ -79,8 +82,11 @@ def survey(
     """Return what ``campaign`` takes with this rig file, and which runs are refused.
 
     Each different sequence is checked by the gate once, as a run does it; ``model`` and ``film`` as
-    of a run. With ``whole`` False it ends at the first run that is refused.
+    of a run. With ``whole`` False it ends at the first run that is refused. Raises ``InputError``
+    where the first model of a validation after runs cannot be read: no run would have an error.
     """
+    if campaign.validate and campaign.model is not None:
+        load_model(campaign.model)
     card, channels = rig_file.card, len(rig_file.terminals())
     known: dict[str, tuple[float, int, str]] = {}
     margins: dict[str, Margin] = {}

@@ -144,6 +144,7 @@ def campaign(
     if model is not None:
         actuator = load_actuator(model)
         settings = of_rig(settings, actuator.film, actuator.load)
+    notify = notify_from(notify_command, notify_webhook, notify_on, loaded.notify).checked()
     if check:
         with working(json) as (console, progress):
             found = foresee(loaded, settings, out, actuator, film, progress)
@@ -157,7 +158,6 @@ def campaign(
     )  # fmt: skip
     with working(json) as (console, progress):
         announce_rig(console, rig, settings, provenance[SOURCE])
-        notify = notify_from(notify_command, notify_webhook, notify_on, loaded.notify).checked()
         if said := notify_text(notify):
             # a plan may be another person's: what it starts is said before anything is played
             print_line(console, f"{loaded.source}: {said}")

@@ -140,13 +140,13 @@ class _After(TomlTable):
         default=False, alias="validate", description="compare with the last model"
     )
     diagnose: bool = Field(default=False, description="find what the model lacks")
-    branches: int = Field(default=3, ge=1, le=10, description="branches of the fitted model")
+    branches: int = Field(default=3, ge=1, le=8, description="branches of the fitted model")
     model: str | None = Field(
         default=None, min_length=1, max_length=NAME_MAX,
         description="model file in the plan's folder, the first one of validate",
     )  # fmt: skip
     stop_when: list[str] = Field(
-        default_factory=list, max_length=100, description="bands of numbers"
+        default=[], max_length=100, examples=[["mu_0_kPa < 40"]], description="bands of numbers"
     )
     parameters: dict[str, Any] = Field(
         default_factory=dict, description="what is known of parameters, a table for each"
@@ -334,6 +334,8 @@ class _Expansion:
         model = None
         if file.after.model is not None:
             model = _beside(self._folder, file.after.model, "after.model")
+        if file.after.validates and model is None and not file.after.identify:
+            raise InputError("after.validate has no model: name after.model, or set after.identify")
         return Campaign(
             name=file.name,
             source=self._source,
@@ -470,21 +472,22 @@ class _Expansion:
                     f'"mu_0_kPa < 40": a number of a run, <, <=, > or >=, and its limit'
                 )
             if found[1] not in known and not (after.diagnose and "." in found[1]):
-                listed = ", ".join(known) or "none, as [after] computes nothing"
                 raise InputError(
-                    f"after.stop_when = {shown(text)}: {found[1]} is not a number that [after] "
-                    f"computes; it computes {listed}"
+                    f"after.stop_when = {shown(text)}: {found[1]} is not a number of a run; with "
+                    f"this plan they are {', '.join(known)}"
                 )
             yield Band(found[1], found[2], limit)
 
 
 #: Numbers that each step after a run gives, besides the parameters of the model.
 ERRORS = ("rms_um", "nrmse_pct", "max_um")
+#: Numbers that each recording gives without any step; those of the room where they are measured.
+MEASURED = ("peak_displacement_mm", "temperature_degC", "relative_humidity_percent")
 
 
 def _numbers(after: _After) -> list[str]:
     """Return the names of the numbers that are computed after each run."""
-    found = []
+    found = [*MEASURED]
     if after.identify:
         found += ["mu_0_kPa", "J_0"]
         for i in range(1, after.branches + 1):
@@ -585,8 +588,6 @@ def _fault(fault: ErrorDetails) -> str:
 def _allowed(info: FieldInfo) -> str:
     if info.annotation is bool:
         return "true or false"
-    if info.annotation == list[str]:
-        return 'a list of texts such as ["mu_0_kPa < 40"]'
     if info.annotation == list[_Run]:
         return "tables [[run]]"
     return allowed(info)

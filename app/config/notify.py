@@ -71,12 +71,15 @@ class NotifyTable(TomlTable):
     """The table ``[notify]`` of a plan."""
 
     command: list[str] = Field(
-        default_factory=list, max_length=100, description="a program and its arguments"
-    )
+        default_factory=list, max_length=100, description="a program and its arguments",
+        examples=[["program", "--option"]],
+    )  # fmt: skip
     webhook: str = Field(
         default="", description="an address that takes JSON, or env:NAME for a variable with one"
     )
-    on: list[Event] = Field(default_factory=lambda: list(EVENTS), description="events to report")
+    on: list[Event] = Field(
+        default_factory=lambda: list(EVENTS), min_length=1, description="events to report"
+    )
     timeout_s: float = Field(
         default=Notify.timeout, gt=0.0, le=3600.0, allow_inf_nan=False,
         description="time for the program, and for the answer of the webhook",

@@ -150,6 +150,10 @@ def allowed(info: FieldInfo, item: bool = False) -> str:
         kind, inner = _bare(get_args(kind)[0], [])
         if item:
             metadata = inner
+        elif kind is str:
+            return f"a list of texts such as {shown((info.examples or [['a text']])[0])}"
+        elif get_origin(kind) is Literal:
+            return f"a list of {' or '.join(map(shown, get_args(kind)))}"
         elif kind is float:
             return f"a list such as [6.0, 6.5], each {_bounded('a number', inner)}"
     words = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}

@@ -52,6 +52,22 @@ def test_a_campaign_from_its_check_to_its_page(given, tmp_path: Path) -> None:
     refused(dearig("campaign-queue", tmp_path / "out", "--skip", "2.0kV"), "run 2.0kV is done")
 
 
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ('[notify]\nwebhook = "file:///etc/passwd"\n', "notify.webhook is not an address"),
+        ('[notify]\ncommand = ["/no/such/program"]\n', "notify.command: the program"),
+        ('[after]\nvalidate = true\nmodel = "none.toml"\n', "none.toml is not there"),
+        ('[grid]\n"segment.0.amplitude_kV" = ["x"]\n', "plan.toml: run x-0001, sequence"),
+    ],
+)
+def test_a_check_refuses_what_the_campaign_would(more, words, tmp_path: Path) -> None:
+    write(tmp_path / "lobe.toml", LOBE)
+    plan = write(tmp_path / "plan.toml", 'name = "x"\nsequence = "lobe.toml"\n' + more)
+    said = refused(dearig("campaign", plan, "--out", tmp_path / "out", "--check"), words)
+    assert said.count("x-0001") <= 1
+
+
 def test_an_interlock_halts_it_with_code_3_until_a_person_has_looked(given, tmp_path: Path) -> None:
     trip = dearig("campaign", *given, "--fault", "arc@0.6", "--json", "-")
     assert trip.code == 3

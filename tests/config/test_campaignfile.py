@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dearig.analysis.readings.compatibility import BRANCHES_MAX
 from dearig.config.campaignfile import EXAMPLE, Campaign, load_campaign, parse_campaign
 from dearig.errors import InputError
 from tests.deep import examples
@@ -127,11 +128,17 @@ def test_a_setting_changes_its_key_and_nothing_else(tmp_path: Path) -> None:
         (HEAD + "[[run]]\nrepeat = 1.5\n", "run[1].repeat = 1.5 is not allowed"),
         (HEAD + "[after]\nidentfy = true\n", "after.identfy is not a key: did you mean identify?"),
         (HEAD + "[after]\nidentify = 1\n", "true or false"),
-        (HEAD + '[after]\nstop_when = "mu_0_kPa < 4"\n', "as [after] computes nothing"),
-        (HEAD + '[after]\nidentify = true\nstop_when = "mu_0 < 4"\n', "it computes mu_0_kPa"),
+        (HEAD + '[after]\nstop_when = "mu_0_kPa < 4"\n', "this plan they are peak"),
+        (HEAD + '[after]\nidentify = true\nstop_when = "mu_0 < 4"\n', "humidity_percent, mu_0_kPa"),
         (HEAD + '[after]\nidentify = true\nstop_when = "mu_0_kPa = 4"\n', "is not a condition"),
         (HEAD + '[after]\nidentify = true\nstop_when = "mu_0_kPa < 1e999"\n', "is not a condition"),
         (HEAD + '[after]\nmodel = "/m.toml"\n', "after.model"),
+        (HEAD + "[after]\nvalidate = true\n", "after.validate has no model"),
+        (HEAD + "[after]\nidentify = true\nbranches = 9\n", "a whole number from 1 to 8"),
+        (HEAD + '[notify]\ncommand = "x"\n', 'a list of texts such as ["program", "--option"]'),
+        (HEAD + '[notify]\non = ["end"]\n', '"run-ended" or "tripped" or "queue-stopped"'),
+        (HEAD + "[notify]\non = []\n", "notify.on"),
+        (HEAD + 'repeat_after = "arc"\n', 'a list of "input-overflow" or'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_one_sentence(text: str, words: str, tmp_path: Path) -> None:
@@ -165,3 +172,12 @@ def test_a_band_is_left_where_its_condition_holds() -> None:
     low, late = parsed(HEAD + text).stop_when
     assert [low.left_by(value) for value in (39.9, 40.0)] == [True, False]
     assert [late.left_by(value) for value in (20.0, 19.9)] == [True, False]
+
+
+def test_a_campaign_may_end_by_what_every_recording_gives() -> None:
+    plan = parsed(HEAD + '[after]\nstop_when = "peak_displacement_mm < 0.1"\n')
+    assert [str(band) for band in plan.stop_when] == ["peak_displacement_mm < 0.1"]
+
+
+def test_a_plan_has_as_many_branches_as_a_fit() -> None:
+    assert parsed(HEAD + f"[after]\nbranches = {BRANCHES_MAX}\n").branches == BRANCHES_MAX

@@ -26,7 +26,7 @@ from dearig.report.pages.head import head_of
 from dearig.report.pages.html import picture, prefixes, write_page
 from dearig.report.text.numbers import NO_VALUE, seconds, significant
 from dearig.report.text.tables import Row, Table
-from dearig.units import name_and_unit
+from dearig.units import name_and_unit, runs_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,8 +125,9 @@ def forecast_texts(campaign: Campaign, forecast: Forecast) -> Iterator[str]:
     warm = sum(run.warm_up for run in campaign.runs)
     extra = f", of which {warm} to warm up" if warm else ""
     yield (
-        f"{campaign.name}: {len(campaign.runs)} runs{extra}, {duration_text(forecast.seconds)} "
-        f"without computations, {forecast.size / 1e6:.3g} MB of {forecast.free / 1e9:.3g} GB free"
+        f"{campaign.name}: {runs_text(len(campaign.runs))}{extra}, "
+        f"{duration_text(forecast.seconds)} without computations, "
+        f"{forecast.size / 1e6:.3g} MB of {forecast.free / 1e9:.3g} GB free"
     )
     for margin in forecast.margins:
         yield (
@@ -157,7 +158,7 @@ def campaign_summary(outcome: CampaignOutcome) -> tuple[str, ...]:
         "left": queue.count(WAITING, RUNNING),
     }  # fmt: skip
     counted = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
-    found = [f"{len(queue.runs)} runs: {counted}."]
+    found = [f"{runs_text(len(queue.runs))}: {counted}."]
     if queue.count(WAITING, RUNNING):
         found.append(f"What is left takes {duration_text(queue.time_left)}.")
     if outcome.reason:

@@ -22,6 +22,7 @@ from dearig.batch.queue import DONE, WAITING, Queue
 from dearig.errors import InputError
 from dearig.recording.result_folder import numbered_folder
 from dearig.report.pages.campaign import duration_text
+from dearig.units import runs_text
 from dearig.window.campaign.controls import CampaignControls
 from dearig.window.campaign.plan import (
     OpenedCampaign,
@@ -35,7 +36,7 @@ from dearig.window.campaign.plan import (
 )
 from dearig.window.campaign.present_run import PresentRun
 from dearig.window.campaign.table import CampaignTable, QueueRows, rows_of_plan
-from dearig.window.campaign.texts import arming_block, counted, crash_text, plan_text, runs_text
+from dearig.window.campaign.texts import arming_block, counted, crash_text, plan_text
 from dearig.window.campaign.thread import CampaignRequest, CampaignThread
 from dearig.window.documents import dialogs
 from dearig.window.high_voltage.state import HighVoltage

@@ -6,17 +6,13 @@ from dearig.acquisition.rigs import is_simulated
 from dearig.batch.queue import DONE, LOST, SKIPPED, STOPPED, WAITING, Queue
 from dearig.config.campaignfile import Campaign
 from dearig.report.pages.campaign import duration_text
+from dearig.units import runs_text
 from dearig.window.campaign.plan import PlanSurvey
 from dearig.window.session.state import Session
 
-__all__ = ["arming_block", "counted", "crash_text", "plan_text", "runs_text"]
+__all__ = ["arming_block", "counted", "crash_text", "plan_text"]
 
 _USED = 0.1  # of a limit: what uses less of it is not named
-
-
-def runs_text(count: int) -> str:
-    """Return a number of runs in words."""
-    return f"{count:,} run{'' if count == 1 else 's'}"
 
 
 def plan_text(found: PlanSurvey) -> str:

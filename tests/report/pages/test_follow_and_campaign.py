@@ -7,8 +7,9 @@ from pathlib import Path
 
 from dearig.batch.campaign import CampaignOutcome
 from dearig.batch.queue import Queue, RunState
-from dearig.report.pages.campaign import write_campaign_report
+from dearig.report.pages.campaign import campaign_summary, write_campaign_report
 from dearig.report.pages.track import errors_figure, track_warnings
+from dearig.units import runs_text
 from tests.report.pages.test_hostile_names import _tracked as tracked
 
 
@@ -39,3 +40,11 @@ def test_lost_runs_are_not_shown_in_the_colour_of_the_best(tmp_path: Path) -> No
     page = write_campaign_report(outcome, tmp_path / "campaign.html").read_text("utf-8")
     assert '<section class="ended"' in page
     assert ".ended tr.mark" in page
+
+
+def test_one_run_is_one_run() -> None:
+    assert [runs_text(n) for n in (1, 2, 1000)] == ["1 run", "2 runs", "1,000 runs"]
+    assert [runs_text(n, "left") for n in (1, 2)] == ["1 run is left", "2 runs are left"]
+    queue = Queue(runs={"a": RunState(name="a", state="done")})
+    (said,) = campaign_summary(CampaignOutcome("x", Path("x"), queue, "complete", ""))
+    assert said == "1 run: 1 done."
