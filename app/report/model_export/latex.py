@@ -10,6 +10,7 @@ from dearig.config.modelfile import ModelFile
 from dearig.model.effects import EFFECTS
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.springs import LIMIT, SPRING_LAWS
+from dearig.report.model_export.caveats import caveats
 from dearig.report.text.laws import other_symbols, parameter_meanings
 from dearig.report.text.numbers import interval, interval_ends, quoted, significant
 
@@ -102,6 +103,7 @@ def _lines(given: ModelFile, version: str) -> Iterator[str]:
         yield from _effect_lines(name, dict(given_values), found)
     if not found:
         yield "\nThe model file has no intervals."
+    yield from (f"\n{_escaped(sentence)}" for sentence in caveats(given))
     yield r"\end{document}"
 
 

@@ -9,6 +9,7 @@ from dearig.config.modelfile import ModelFile
 from dearig.model.effects import EFFECTS
 from dearig.model.film.material import Spring
 from dearig.model.simulation.actuator import Actuator
+from dearig.report.model_export.caveats import caveats
 from dearig.report.text.laws import place_text
 from dearig.report.text.numbers import significant
 
@@ -65,6 +66,7 @@ def _lines(given: ModelFile, version: str) -> Iterator[str]:
         yield f"{i:3d}  {g / instant!r:<22} {tau!r:<22} {g!r}"
     yield ""
     yield "What the numbers mean"
+    yield from (f"- {sentence}" for sentence in caveats(given))
     yield (
         f"- tau_i = T_i lambda_rest/{factor:g}: in the model d xi/dt = P(lambda/xi)/T, and near the "
         f"stretch {significant(rest, 5)} the stress of a branch decays with that time while the film "
@@ -83,7 +85,8 @@ def _lines(given: ModelFile, version: str) -> Iterator[str]:
         if slope is not None:
             yield (
                 f"  At the rest stretch {significant(rest, 5)} the program's branches are "
-                f"{significant(100.0 * (slope - 1.0), 2)} % stiffer than the model's (neo-Hookean)."
+                f"{significant(100.0 * abs(slope - 1.0), 2)} % {'stiffer' if slope > 1.0 else 'softer'} "
+                f"than the model's (neo-Hookean)."
             )
         yield (
             "- The Maxwell stress eps (V/z)^2 is a load: apply it as a pressure on the faces, or couple "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pprint
+import textwrap
 from collections.abc import Iterator
 
 import numpy as np
@@ -37,6 +38,7 @@ from dearig.model.film.network import HEAD
 from dearig.model.film.sensor import at_sensor
 from dearig.model.simulation.actuator import STATUS_WORDS, Actuator, ends_of
 from dearig.model.simulation.film_kernel import add_effects, drive_by_stretch
+from dearig.report.model_export.caveats import caveats
 from dearig.report.model_export.gather import gathered
 
 __all__ = ["python_file"]
@@ -185,13 +187,21 @@ def python_file(given: ModelFile, version: str) -> str:
     words = pprint.pformat(dict(STATUS_WORDS), width=88)
     return "".join(
         (
-            _HEADER.format(name=given.name, version=version, what=what),
+            _HEADER.format(
+                name=given.name, version=version, what="\n".join([what, *_wrapped(given)])
+            ),
             "\n".join(_numbers(given, c)),
             f"\n\n\nSTATUS = {words}\n\n\n",
             source,
             simulate,
         )
     )
+
+
+def _wrapped(given: ModelFile) -> Iterator[str]:
+    """Yield lines of the file's docstring on what the fit said against the numbers."""
+    for sentence in caveats(given):
+        yield from textwrap.wrap(sentence.replace("\\", "/").replace('"', "'"), width=88)
 
 
 def _numbers(given: ModelFile, c: np.ndarray) -> Iterator[str]:

@@ -196,6 +196,24 @@ def test_what_a_prony_series_cannot_express_is_named() -> None:
     assert math.isclose(1.0 - sum(shares), TABLE_3.equilibrium.modulus / instant, rel_tol=1e-9)
 
 
+@pytest.mark.parametrize("to", ["latex", "prony", "python"])
+def test_what_the_fit_said_against_its_numbers_goes_with_them(to: str) -> None:
+    weak = {"name": "mu_1", "unit": "Pa", "value": 8e6, "low95": 5e6, "determined": False}
+    history = {"estimate": [weak], "warnings": ["the model is rejected: noise as that"]}
+    told, plain = (
+        re.sub(r"[\s\\]+", " ", export_text(ModelFile("m", PLAIN, h), to)).replace(" _", "_")
+        for h in (history, {"estimate": [{**weak, "determined": True}]})
+    )
+    for words in ("fitted to reject it", "The data do not determine mu_1: other values fit"):
+        assert words in told
+        assert words not in plain
+
+
+def test_a_branch_that_is_weaker_in_another_program_is_called_softer() -> None:
+    told = export_text(ModelFile("m", PLAIN), "prony")
+    assert re.search(r"branches are 1\d % softer than the model's", told)
+
+
 def test_the_command_writes_each_kind_and_refuses_others(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     save_model(path, "m", PLAIN, {})
