@@ -55,6 +55,11 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
     could be anything. Nothing is changed.
     """
     path = Path(path)
+    if str(path) == "-":  # for other programs standard output; a file of that name is a trap
+        raise InputError(
+            "- is not the name of a file: only JSON can be written to standard output; give the "
+            "output a name"
+        )
     try:
         if path.is_symlink():
             raise InputError(

@@ -15,6 +15,8 @@ _NUMBERED_MAX = 10_000
 
 def result_folder(out: Path, overwrite: bool) -> Path:
     """Create the folder ``out``; ``InputError`` if it is not empty, unless ``overwrite``."""
+    if str(out) == "-":
+        raise InputError("- is not the name of a folder; give one for the results")
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; give a folder for the results")
     if out.is_dir() and any(out.iterdir()) and not overwrite:

@@ -163,3 +163,12 @@ def test_a_move_never_replaces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         with pytest.raises(FileExistsError):
             move(a, b)
     assert (a.read_text("utf-8"), b.read_text("utf-8")) == ("a", "b")
+
+
+def test_an_output_is_not_a_file_whose_name_is_a_dash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for overwrite in (False, True):
+        with pytest.raises(InputError, match="only JSON can be written to standard output"):
+            check_output("-", overwrite)
