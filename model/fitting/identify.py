@@ -40,7 +40,7 @@ from dearig.model.fitting.parameters import (
     require_free,
 )
 from dearig.model.fitting.problem import Problem
-from dearig.model.fitting.rejection import misfit_p
+from dearig.model.fitting.rejection import ABOVE, DIAGNOSE, REJECTED, misfit_p, with_intervals
 from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
 from dearig.model.fitting.spare import sums_text
 from dearig.model.fitting.thinning import thinned
@@ -222,7 +222,7 @@ def add_intervals(
             break
     if found is None:
         found = _intervals(problem, layout.initial(), held, progress, math.inf, ended)
-    warnings = fitted.warnings
+    warnings = tuple(map(with_intervals, fitted.warnings))
     if found.sums:
         warnings = (*warnings, sums_text(found.sums))
     return replace(
@@ -276,14 +276,10 @@ def _result(
     p = _misfit_p(problem, left)
     if p is not None and is_rejected(p):
         warnings.append(
-            f"the model is rejected: noise as that at rest leaves such a residual with "
-            f"{p_text(p)}; the intervals hold only if the model were right; run a diagnosis"
+            f"{REJECTED}: noise as that at rest leaves such a residual with {p_text(p)}{DIAGNOSE}"
         )
     elif cost > _MISFIT and p is None and method == "hybrid":
-        warnings.append(
-            "the residual is above the noise: the model lacks something, and the intervals "
-            "(widened by the residual's size and correlation) are a rough guide"
-        )
+        warnings.append(ABOVE)
     warnings += [
         f"{e.name} is {end_text(q, e.value)}: the data may ask for a value beyond it"
         for q, e in zip(layout.quantities, estimates[-layout.size :], strict=True)

@@ -16,7 +16,7 @@ from dearig.model.fitting.intervals import (
 )
 from dearig.model.readings.noise import REST_MIN
 
-__all__ = ["NoiseTest", "misfit_p", "noise_test"]
+__all__ = ["ABOVE", "DIAGNOSE", "REJECTED", "NoiseTest", "misfit_p", "noise_test", "with_intervals"]
 
 _LAGS = 20  # of the Ljung-Box test
 
@@ -133,3 +133,20 @@ def _runs(residual: np.ndarray) -> float:
     mean = 1.0 + 2.0 * a * b / (a + b)
     variance = (mean - 1.0) * (mean - 2.0) / (a + b - 1.0)
     return float(scipy.special.ndtr((runs - mean) / math.sqrt(variance)))
+
+
+#: How the warning of a rejected fit begins and ends, and that of one without a noise floor.
+REJECTED = "the model is rejected"
+DIAGNOSE = "; run a diagnosis"
+ABOVE = "the residual is above the noise: the model lacks something"
+
+
+def with_intervals(warning: str) -> str:
+    """Return a warning of a fit with what it means for intervals, once there are any."""
+    if warning.startswith(REJECTED):
+        plain = warning.removesuffix(DIAGNOSE)
+        return f"{plain}; the intervals hold only if the model were right{DIAGNOSE}"
+    if warning == ABOVE:
+        widened = "widened by the residual's size and correlation"
+        return f"{warning}, and the intervals ({widened}) are a rough guide"
+    return warning

@@ -6,20 +6,20 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dearig.config.modelfile import ModelFile
+from dearig.model.fitting.rejection import REJECTED
 from dearig.model.verdict import NOT_CONFIRMED, PARTLY_EXPLAINED, UNEXPLAINED
 from dearig.report.text.numbers import to_ascii
 from dearig.report.text.sentences import undetermined_names_text
 
 __all__ = ["caveats"]
 
-_REJECTED = "the model is rejected"  # how the warning of a fit begins
 _REJECTS = (PARTLY_EXPLAINED, NOT_CONFIRMED, UNEXPLAINED)
 
 
 def caveats(given: ModelFile) -> Iterator[str]:
     """Yield sentences in ASCII: the data reject the model, or do not determine its numbers."""
     history = given.history
-    warned = any(w.startswith(_REJECTED) for w in _listed(history, "warnings", str))
+    warned = any(w.startswith(REJECTED) for w in _listed(history, "warnings", str))
     if warned or history.get("verdict") in _REJECTS:
         yield (
             "The recordings that the model was fitted to reject it: they leave more than noise. "

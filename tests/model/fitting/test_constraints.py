@@ -15,6 +15,7 @@ from dearig.model.fitting.estimates import AT_STATED_BOUND
 from dearig.model.fitting.identify import _farthest
 from dearig.model.fitting.parameters import FitLayout
 from dearig.model.fitting.problem import Problem
+from dearig.model.fitting.rejection import ABOVE, DIAGNOSE, with_intervals
 from dearig.model.readings.records import FilmRecord
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
@@ -346,3 +347,14 @@ def test_far_from_a_prior_is_a_plain_number():
     layout = SimpleNamespace(names=("mu_0",), priors=[0])
     told = [_farthest(layout, np.array([far])) for far in (-1.64, 164.2)]
     assert told == [f"mu_0, by {n} of its standard deviations" for n in ("1.6", "164")]
+
+
+def test_a_fit_without_intervals_does_not_speak_of_them():
+    plain = f"the model is rejected: p < 1e-15{DIAGNOSE}"
+    assert with_intervals(plain) == (
+        "the model is rejected: p < 1e-15; the intervals hold only if the model were right; "
+        "run a diagnosis"
+    )
+    assert "are a rough guide" in with_intervals(ABOVE)
+    assert with_intervals("mu_0 is at its end") == "mu_0 is at its end"
+    assert not any("interval" in w for w in fit(beside("mu_0", 8.0, 1.0), intervals=False).warnings)
