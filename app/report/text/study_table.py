@@ -57,7 +57,8 @@ def study_table_rows(table: StudyTable, most: int) -> Table:
     rows = [
         Row(
             (row["recording"], row["state"], *(_shown(row, name) for name in shown)),
-            detail=row["reason"],
+            # the reason may begin with the name, which is printed before it
+            detail=row["reason"].removeprefix(f"{row['recording']}: "),
             mark=row["state"] != "ok",
         )
         for row in table.rows[:most]
