@@ -198,14 +198,21 @@ def budget_cells(e: Estimate, factor: float) -> list[str]:
     return [significant(shifted, 2) if shifted else NO_VALUE, both]
 
 
-def budget_text(budget: Sequence[Contribution]) -> str:
-    """Return what the columns ``BUDGET_HEAD`` are, and the uncertainties that they come from."""
+def budget_text(budget: Sequence[Contribution], known: bool = True) -> str:
+    """Return what the columns ``BUDGET_HEAD`` are, and the uncertainties that they come from.
+
+    ``known`` is whether there are intervals.
+    """
     values = ", ".join(
         f"{c.given.name} {significant(100.0 * c.given.relative, 2)} %" for c in budget
     )
+    given = (
+        f"Given values, with standard uncertainties by the rig file ({values}), move a parameter"
+    )
+    if not known:
+        return f"{given} by the column of one standard deviation."
     return (
-        f"The 95 % interval is of the noise alone. Given values, with standard uncertainties "
-        f"by the rig file ({values}), move a parameter by the next column; the last interval "
+        f"The 95 % interval is of the noise alone. {given} by the next column; the last interval "
         f"has both."
     )
 
@@ -273,7 +280,7 @@ def parameter_table(fit: Identification, rejected: bool = False) -> Table:
         head.append(("Thesis", "Table 3"))
     notes = []
     if fit.budget:
-        notes.append(budget_text(fit.budget))
+        notes.append(budget_text(fit.budget, known))
     if any(e.at_bound for e in fit.estimates):
         notes.append("At bound: at an end of its range; the data may ask for more.")
     if any(e.is_fixed for e in fit.estimates):

@@ -10,6 +10,7 @@ import pytest
 
 from dearig.analysis.outcomes import pooled_rms
 from dearig.errors import InputError
+from dearig.model.fitting.parameters import Contribution, GivenValue
 from dearig.model.readings.measures import errors
 from dearig.report.as_json import outcome_json
 from dearig.report.pages.html import write_demo_report, write_identify_report, write_validate_report
@@ -362,6 +363,16 @@ class TestWords:
             undetermined_text(fit(estimates=(fit().estimates[2],)))
             == "The data determine every parameter."
         )
+
+    def test_given_values_of_a_fit_without_intervals_speak_of_none(self):
+        given = Contribution(GivenValue("thickness", 0.02), (), ())
+        known, unknown = (
+            parameter_table(fit(budget=(given,), **more)).note
+            for more in ({}, {"covariance": np.empty((0, 0)), "covariance_names": ()})
+        )
+        assert "The 95 % interval is of the noise alone" in known
+        assert "interval" not in unknown
+        assert "(thickness 2.0 %), move a parameter by the column of one" in unknown
 
     def test_warnings_have_the_symbols_of_the_tables(self):
         told = ("these data determine mu_1 + mu_2, not the parts; see mu_1_kPa in mu_1.toml",)
