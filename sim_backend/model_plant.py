@@ -12,7 +12,7 @@ from dearig.model.effects import EFFECTS, SENSOR_MEMORY
 from dearig.model.readings.environment import CELSIUS, HUMIDITY
 from dearig.model.simulation.actuator import (
     NO_AIR,
-    STATUS_WORDS,
+    STATUS_TEXTS,
     Actuator,
     Drive,
     at_rest,
@@ -107,7 +107,7 @@ class ModelPlant:
                 state, stretch, rate,
             )  # fmt: skip
             if status != kernel.OK:
-                fault, fault_at = STATUS_WORDS[status], int(reached)
+                fault, fault_at = STATUS_TEXTS[status], int(reached)
                 state = np.concatenate((stretch[-1:], [0.0], state[2:]))
             after = replace(self, state=state, failed=fault is not None)
         length = self.actuator.film.length

@@ -28,7 +28,7 @@ from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.serial_line import SimulatedLine
 from dearig.sim_backend.vaisala import SimulatedProbe
 
-__all__ = ["Air", "SimulatedSource", "air_of_run", "still_air", "time_in_room"]
+__all__ = ["AirOfRoom", "SimulatedSource", "air_of_run", "still_air", "time_in_room"]
 
 _HOUR = 3600.0  # s
 _DAY = 24.0 * _HOUR
@@ -49,7 +49,7 @@ def time_in_room(settings: RoomSettings, run: int, computer: Callable[[], float]
 
 
 @dataclass(frozen=True)
-class Air:
+class AirOfRoom:
     """Room of ``settings`` as a run sees it that starts at ``start`` s in the room.
 
     Times are s after the start of the run, any shape; earlier ones are the past of the room.
@@ -95,9 +95,9 @@ class Air:
         return np.asarray(changes)
 
 
-def air_of_run(settings: RoomSettings, run: int) -> Air:
+def air_of_run(settings: RoomSettings, run: int) -> AirOfRoom:
     """Return the air of run number ``run`` of a simulated rig that starts now."""
-    return Air(settings, time_in_room(settings, run, _local_seconds))
+    return AirOfRoom(settings, time_in_room(settings, run, _local_seconds))
 
 
 def _local_seconds() -> float:
@@ -106,9 +106,9 @@ def _local_seconds() -> float:
     return now + time.localtime(now).tm_gmtoff
 
 
-def still_air(temperature: float, humidity: float) -> Air:
+def still_air(temperature: float, humidity: float) -> AirOfRoom:
     """Return air that stays at so many degrees Celsius and per cent."""
-    return Air(RoomSettings(temperature_degC=temperature, relative_humidity_percent=humidity))
+    return AirOfRoom(RoomSettings(temperature_degC=temperature, relative_humidity_percent=humidity))
 
 
 class SimulatedSource:
@@ -123,7 +123,7 @@ class SimulatedSource:
     def __init__(
         self,
         settings: ThermohygrometerSettings,
-        air: Air,
+        air: AirOfRoom,
         seed: tuple[int, ...] = (0,),
         faults: FaultPlan | None = None,
     ) -> None:
@@ -178,7 +178,7 @@ class SimulatedSource:
     def _has(self, kind: FaultKind) -> bool:
         return any(f.at <= self._elapsed < f.end for f in self._faults.of(kind))
 
-    def _measured(self, air: Air) -> tuple[float, float]:
+    def _measured(self, air: AirOfRoom) -> tuple[float, float]:
         at, noise = np.array(self._elapsed), self._probe.noise(2)
         room = air.settings
         return (

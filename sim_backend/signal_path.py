@@ -18,7 +18,7 @@ from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.laser import Laser, LaserRows, LaserState
 from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.plant import Motion, Plant
-from dearig.sim_backend.room import Air
+from dearig.sim_backend.room import AirOfRoom
 from dearig.sim_backend.streams import Streams
 
 __all__ = ["CHUNK", "PathState", "SignalPath"]
@@ -71,10 +71,10 @@ class SignalPath:
         faults: FaultPlan | None = None,
         noise: str = WHITE,
         chunk: int = CHUNK,
-        air: Air | None = None,
+        air: AirOfRoom | None = None,
     ) -> None:
         self._chunk = chunk
-        self._air = air or Air(settings.room)
+        self._air = air or AirOfRoom(settings.room)
         self._settings = settings
         self._rate = rate
         self._faults = faults or FaultPlan()

@@ -157,11 +157,11 @@ def check_table(outcome: CheckOutcome) -> RenderableType:
         table.add_column(no_wrap=True, width=max(map(len, _LOOKS)))
         table.add_column(overflow="fold")
         for finding in group:
-            words = f"{finding.item}: {finding.found}"
+            text = f"{finding.item}: {finding.found}"
             if finding.verdict != "ok":
                 wanted = f", expected {finding.wanted}" if finding.wanted else ""
-                words += wanted + (f"; {finding.advice}" if finding.advice else "")
-            table.add_row(Text(finding.verdict, style=_LOOKS[finding.verdict]), Text(words))
+                text += wanted + (f"; {finding.advice}" if finding.advice else "")
+            table.add_row(Text(finding.verdict, style=_LOOKS[finding.verdict]), Text(text))
         pieces.append(table)
     return Group(*pieces, Text(f"{outcome.rig}: {outcome.summary}."))
 

@@ -20,7 +20,7 @@ from dearig.model.errors import ModelError
 from dearig.model.film.sensor import at_sensor
 from dearig.model.simulation.actuator import (
     NO_AIR,
-    STATUS_WORDS,
+    STATUS_TEXTS,
     Actuator,
     at_rest,
     ends_of,
@@ -98,7 +98,7 @@ class Overlay:
         self._coefficients = actuator.coefficients()
         status, self._rest = at_rest(self._coefficients)
         if status != kernel.OK:
-            raise ModelError(STATUS_WORDS[status])
+            raise ModelError(STATUS_TEXTS[status])
         self._state = initial_state(self._coefficients, self._rest)
         self._memory = np.zeros(SENSOR_MEMORY)
         self._next = 0
@@ -161,7 +161,7 @@ class Overlay:
         moved = (stretch - self._rest) * self._length
         out = self._sensed(time[first:], moved[first:], speed[first:] * self._length)
         if status != kernel.OK:
-            self._failure = f"{STATUS_WORDS[status]} (at {time[min(reached, time.size - 1)]:.4g} s)"
+            self._failure = f"{STATUS_TEXTS[status]} (at {time[min(reached, time.size - 1)]:.4g} s)"
             out[max(reached - first, 0) :] = np.nan
         return out
 

@@ -12,7 +12,7 @@ from dearig.drivers.samples import Repeated, Samples
 from dearig.model import kernel
 from dearig.model.effects import SENSOR_MEMORY
 from dearig.model.kinematics import thinning
-from dearig.model.simulation.actuator import NO_AIR, STATUS_WORDS, Actuator, at_rest, initial_state
+from dearig.model.simulation.actuator import NO_AIR, STATUS_TEXTS, Actuator, at_rest, initial_state
 
 __all__ = ["PredictedFilm", "peaks_of", "stride_at"]
 
@@ -149,7 +149,7 @@ class PredictedFilm:
         predicted = peaks.size
         if status != kernel.OK:
             self._ended = True
-            self.pull_in = f"{STATUS_WORDS[status]} (at {time[min(reached, predicted)]:.4g} s)"
+            self.pull_in = f"{STATUS_TEXTS[status]} (at {time[min(reached, predicted)]:.4g} s)"
             predicted = min(reached, predicted)
         first = start // self.stride
         for kept, values in (

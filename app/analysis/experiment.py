@@ -33,7 +33,7 @@ from dearig.drivers.interlocks import would_trip
 from dearig.drivers.samples import Repeated
 from dearig.drivers.settings import CardSettings
 from dearig.errors import InputError
-from dearig.model.diagnosis.excitation import Excitation, Motion, excitation, range_of
+from dearig.model.diagnosis.excitation import Excitation, PredictedRun, excitation, range_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.kernel import OK
 from dearig.model.readings.measures import root_mean_square
@@ -321,7 +321,7 @@ def determining_record(
         if playable is None:
             continue
         loaded, waveform, (moved,) = playable
-        motion = Motion(name, waveform.duration / moved.size, np.zeros(1), moved, noise)
+        motion = PredictedRun(name, waveform.duration / moved.size, np.zeros(1), moved, noise)
         left = [each.after(motion) for each in asked]
         if not any(each.undetermined for each in left):
             worst = max(each.open_rms for each in left)

@@ -205,7 +205,7 @@ def _actuator(
         )
     response = model.simulate(drive)
     if not response.ok:
-        raise InputError(f"the model cannot follow this voltage: {response.in_words}")
+        raise InputError(f"the model cannot follow this voltage: {response.status_text}")
     values = {
         "time": drive.time,
         "voltage_command": drive.voltage,
@@ -222,7 +222,7 @@ def _film(
     strip = Strip(model.network) if isinstance(model, Actuator) else model
     answer = replace(strip, kinematics=kinematics).simulate(time, stretch)
     if not answer.ok:
-        raise InputError(f"the model cannot follow this stretch: {answer.in_words}")
+        raise InputError(f"the model cannot follow this stretch: {answer.status_text}")
     return {"time": time, "stretch": stretch, "nominal_stress": answer.stress}
 
 

@@ -12,7 +12,7 @@ from dearig.analysis.identify import identify_recordings
 from dearig.analysis.outcomes import save_fitted_model
 from dearig.analysis.validate import validate_model
 from dearig.batch.numbers import conditions_of, numbers_of
-from dearig.config.campaignfile import Band, Campaign
+from dearig.config.campaignfile import Campaign, StopCondition
 from dearig.config.modelfile import ModelFile, load_model
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError, Interrupted
@@ -111,7 +111,7 @@ def _model(campaign: Campaign, folder: Path, last_model: str) -> ModelFile | Non
     return None if campaign.model is None else load_model(campaign.model)
 
 
-def band_violation(bands: tuple[Band, ...], numbers: dict[str, float]) -> str:
+def band_violation(bands: tuple[StopCondition, ...], numbers: dict[str, float]) -> str:
     """Return a sentence on the first band that a number has left, "" if none has.
 
     A parameter that the data do not determine is not among the numbers, and leaves no band.

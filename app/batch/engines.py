@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from dearig.drivers.processes.children import isolated_spawn
 from dearig.errors import InputError
 from dearig.extras import import_extra
-from dearig.recording.files import in_words, journal_of, one_line
+from dearig.recording.files import journal_of, one_line, system_text
 
 # a worker process imports this module before it knows its task
 if TYPE_CHECKING:
@@ -203,7 +203,7 @@ class DaskEngine:
             return self._dask.Client(self._address, timeout=_DASK_TIMEOUT, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise InputError(
-                f"no Dask scheduler answers at {self._address}: {in_words(error)}"
+                f"no Dask scheduler answers at {self._address}: {system_text(error)}"
             ) from error
 
     def run(self, tasks: Sequence[FitTask]) -> Iterator[tuple[FitTask, Row]]:

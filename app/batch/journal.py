@@ -21,7 +21,7 @@ from dearig.clock import UnixTime
 from dearig.errors import InputError
 from dearig.input_file import parse_json, read_input
 from dearig.recording.content.layout import iso_time
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.lock import lock_existing
 
 __all__ = ["FORMAT", "JOURNAL", "REQUESTS", "Journal", "append_line", "read_lines"]
@@ -101,7 +101,7 @@ class Journal:
             os.close(os.open(self.path, os.O_WRONLY | os.O_CREAT, 0o666))
             self._lock = lock_existing(self.path)
         except OSError as error:
-            raise InputError(f"{self.path} cannot be written: {in_words(error)}") from error
+            raise InputError(f"{self.path} cannot be written: {system_text(error)}") from error
         except InputError as error:
             raise InputError(
                 f"the campaign in {folder} is running in another process (its journal is locked)",
@@ -131,7 +131,7 @@ class Journal:
             _write(self._lock.fd, entry)
         except OSError as error:
             raise InputError(
-                f"{self.path} cannot be written: {in_words(error)}; the output is at 0 V; free "
+                f"{self.path} cannot be written: {system_text(error)}; the output is at 0 V; free "
                 f"some space, then continue the campaign",
                 option="resume",
             ) from error
@@ -178,7 +178,7 @@ def append_line(path: Path, entry: dict[str, Any]) -> None:
         finally:
             os.close(fd)
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be written: {system_text(error)}") from error
 
 
 def _write(fd: int, entry: dict[str, Any]) -> None:

@@ -216,8 +216,8 @@ class Notifier:
                 return
             if process.returncode:
                 said.seek(0)
-                words = said.read(_TOLD).decode("utf-8", "replace").strip()
-                self._failed(what, f"it ended with {process.returncode}: {words}")
+                text = said.read(_TOLD).decode("utf-8", "replace").strip()
+                self._failed(what, f"it ended with {process.returncode}: {text}")
                 return
         self._failing.discard(what)
 

@@ -62,8 +62,8 @@ def fit_film(task: FitTask, progress: Progress = quiet) -> Row:
         except Exception as error:  # one film must not cost the rows of the others
             log.exception("unexpected error with film %s", task.name)
             for name, _ in good:
-                told_why = f"unexpected error ({type(error).__name__}: {one_line(error)})"
-                rows[name]["reason"] = f"{name}: {told_why}"
+                reason = f"unexpected error ({type(error).__name__}: {one_line(error)})"
+                rows[name]["reason"] = f"{name}: {reason}"
             del done["sha256"]  # such rows are not kept
     return {**done, "rows": list(rows.values())}
 

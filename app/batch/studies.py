@@ -20,7 +20,7 @@ from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.input_file import parse_json, read_input
 from dearig.progress import Progress, quiet
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.json_file import write_json
 from dearig.recording.reading.index import ENDINGS, glance, list_folder
 
@@ -263,12 +263,12 @@ def _cache_in(out: Path) -> Path:
     try:
         cache.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{cache} cannot be created: {in_words(error)}") from error
+        raise InputError(f"{cache} cannot be created: {system_text(error)}") from error
     return cache
 
 
 def _unreadable(subject: Subject, error: OSError) -> Row:
-    reason = f"{subject.name} cannot be read: {in_words(error)}"
+    reason = f"{subject.name} cannot be read: {system_text(error)}"
     return {"recording": subject.name, "state": "failed", "reason": reason}
 
 

@@ -16,7 +16,7 @@ from dearig.extras import import_extra
 from dearig.input_file import read_input
 from dearig.printable import no_formula, unmarked
 from dearig.recording.content.fields import TEXTS
-from dearig.recording.files import in_words, replaced_when_done, write_whole
+from dearig.recording.files import replaced_when_done, system_text, write_whole
 
 __all__ = ["columns_of", "read_table", "write_csv", "write_parquet"]
 
@@ -131,7 +131,7 @@ def _read_parquet(path: Path) -> list[dict[str, Any]]:
     try:
         rows: list[dict[str, Any]] = parquet.read_table(path).to_pylist()
     except OSError as error:
-        raise InputError(f"table {path} cannot be read: {in_words(error)}") from error
+        raise InputError(f"table {path} cannot be read: {system_text(error)}") from error
     except (pyarrow.ArrowException, ValueError) as error:
         raise InputError(f"table {path}: not Parquet ({error})") from error
     return [{name: _finite(value) for name, value in row.items()} for row in rows]

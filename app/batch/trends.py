@@ -33,7 +33,7 @@ from dearig.batch.trend_columns import (
 )
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 
 __all__ = ["Trends", "find_trends", "table_of", "write_trends"]
 
@@ -138,7 +138,7 @@ def write_trends(trends: Trends, folder: Path) -> dict[str, Path | None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder} cannot be created: {in_words(error)}") from error
+        raise InputError(f"{folder} cannot be created: {system_text(error)}") from error
     effects, changes = folder / "trends.csv", folder / "changes.csv"
     write_csv(trends.effect_rows(), effects)
     write_csv(trends.change_rows(), changes)

@@ -156,15 +156,15 @@ def import_(
         console,
         f"{out}: {recording.samples} samples, {recording.duration:.1f} s of {recording.kind} data",
     )
-    for took in done.took:
-        print_line(console, f"  {took}")
+    for named in done.columns:
+        print_line(console, f"  {named}")
     remarks = [with_hints(note) for note in done.notes]
-    questions = [with_hints(doubt) for doubt in done.doubts]
+    questions = [with_hints(doubt) for doubt in done.warnings]
     for remark in remarks:
         print_line(console, f"Note: {remark}")
     for question in questions:
         print_line(console, f"Check this: {question}", style="yellow")
-    found = {"took": list(done.took), "notes": remarks, "doubts": questions}
+    found = {"took": list(done.columns), "notes": remarks, "doubts": questions}
     write_result({**describe(recording), **found}, json)
 
 

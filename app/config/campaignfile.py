@@ -45,9 +45,9 @@ from dearig.errors import InputError
 __all__ = [
     "EXAMPLE",
     "PLAN_TABLE",
-    "Band",
     "Campaign",
     "PlannedRun",
+    "StopCondition",
     "digest_of",
     "load_campaign",
     "parse_campaign",
@@ -205,7 +205,7 @@ _BAND = re.compile(r"\s*([A-Za-z_][\w.-]*)\s*(<=|>=|<|>)\s*([-+]?[0-9.]+(?:[eE][
 
 
 @dataclass(frozen=True)
-class Band:
+class StopCondition:
     """A condition on the number ``name`` of a run that ends the campaign: ``mu_0_kPa < 40``."""
 
     name: str
@@ -261,7 +261,7 @@ class Campaign:
     branches: int
     parameters: Stated
     model: Path | None
-    stop_when: tuple[Band, ...]
+    stop_when: tuple[StopCondition, ...]
     keep_every: int
     keep_cycles: int
     sequences: Mapping[str, str]
@@ -457,7 +457,7 @@ class _Expansion:
                 f"{TEXT_MAX:,} are read at most: write fewer runs, or shorter sequences"
             )
 
-    def _bands(self) -> Iterator[Band]:
+    def _bands(self) -> Iterator[StopCondition]:
         after = self._file.after
         known = _numbers(after)
         for text in after.stop_when:
@@ -476,7 +476,7 @@ class _Expansion:
                     f"after.stop_when = {shown(text)}: {found[1]} is not a number of a run; with "
                     f"this plan they are {', '.join(known)}"
                 )
-            yield Band(found[1], found[2], limit)
+            yield StopCondition(found[1], found[2], limit)
 
 
 #: Numbers that each step after a run gives, besides the parameters of the model.

@@ -92,8 +92,8 @@ def _place(fault: ErrorDetails) -> tuple[str, str]:
 def _sentence_at(place: tuple[str, str], fault: ErrorDetails) -> str:
     if place[0] in REPEATED or fault["type"] in ("model_type", "model_attributes_type"):
         return fault_text(fault)
-    words = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else ""
-    return _sentence(*place, fault["input"], words)
+    text = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else ""
+    return _sentence(*place, fault["input"], text)
 
 
 def _leave_out(data: dict[str, Any], table: str, key: str) -> bool:

@@ -258,12 +258,12 @@ class _Built:
             self.faults.append(SequenceFault(f"{where}: {error}", str(error), row))
             return
         if len(self.segments) + table.repeats > SEGMENTS_MAX:
-            words = (
+            text = (
                 f"repeats = {table.repeats} makes more than {SEGMENTS_MAX:,} segments in all; play "
                 f"the sequence several times"
             )
             self.faults.append(
-                SequenceFault(f"{where} ({table.kind}): {words}", words, row, "repeats")
+                SequenceFault(f"{where} ({table.kind}): {text}", text, row, "repeats")
             )
             return
         self.segments += [built] * table.repeats
@@ -278,8 +278,8 @@ class _Built:
     def join(self) -> None:
         """Find the segments that do not start where the one before ends."""
         for i, sentence in join(self.segments, tuple(self.labels))[1]:
-            words = sentence.removeprefix(f"segment {i + 1} ({self.labels[i]}) ")
-            self.faults.append(SequenceFault(sentence, words, self.rows[i]))
+            text = sentence.removeprefix(f"segment {i + 1} ({self.labels[i]}) ")
+            self.faults.append(SequenceFault(sentence, text, self.rows[i]))
 
 
 def _more(count: int) -> str:

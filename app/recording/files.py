@@ -27,7 +27,6 @@ __all__ = [
     "check_output",
     "errno_of",
     "file_sha256",
-    "in_words",
     "journal_of",
     "keep_permissions",
     "old_of",
@@ -35,6 +34,7 @@ __all__ = [
     "put_back",
     "replaced_when_done",
     "set_aside",
+    "system_text",
     "write_whole",
 ]
 
@@ -84,7 +84,7 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
         if not path.parent.is_dir():
             raise InputError(f"{path} cannot be written: there is no folder {path.parent}")
     except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be written: {system_text(error)}") from error
     if not os.access(path.parent, os.W_OK):
         raise InputError(
             f"{path} cannot be written: the folder {path.parent} may not be written to; "
@@ -105,7 +105,7 @@ def errno_of(error: Exception) -> int | None:
     return int(found[1]) if found else None
 
 
-def in_words(error: Exception) -> str:
+def system_text(error: Exception) -> str:
     """Return the system's text of ``error``, without its number and without the path."""
     number = errno_of(error)
     return one_line(error) if number is None else os.strerror(number)
@@ -131,14 +131,14 @@ def replaced_when_done(path: Path, overwrite: bool) -> Iterator[Path]:
         _remove_abandoned(path.parent)
         lock = _create_partial(path.parent)
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be written: {system_text(error)}") from error
     try:
         yield lock.path
         if not stat.S_ISREG(lock.path.lstat().st_mode):
             raise InputError(f"{path} cannot be written: {lock.path} is no longer a regular file")
         _publish(lock, path, overwrite)
     except (OSError, RuntimeError) as error:
-        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be written: {system_text(error)}") from error
     finally:
         # what cannot be removed now is removed with the next output in this folder
         lock.remove()

@@ -13,7 +13,7 @@ from dearig.input_file import why_no_file
 from dearig.recording.content.journal import carry_out, changed_in_place, whole_journal
 from dearig.recording.content.layout import LIBVER, NUMBERED, name_dimensions
 from dearig.recording.content.superblock import repair_superblock
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.lock import FileLock, lock_existing
 from dearig.recording.reading.opening import UNREADABLE, opened
 from dearig.recording.reading.reader import is_finished, open_recording
@@ -59,7 +59,7 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
                 fsync=True,
             )
     except UNREADABLE as error:
-        raise InputError(f"{path} cannot be repaired: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be repaired: {system_text(error)}") from error
     return True
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dearig.errors import InputError
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 
 __all__ = ["numbered_folder", "result_folder"]
 
@@ -43,7 +43,7 @@ def numbered_folder(folder: Path, name: str) -> Path:
                 continue
             return where
     except OSError as error:
-        raise InputError(f"{where} cannot be made: {in_words(error)}") from error
+        raise InputError(f"{where} cannot be made: {system_text(error)}") from error
     raise InputError(
         f"{folder} holds {_NUMBERED_MAX} results of this kind; choose another folder for the "
         f"results"

@@ -15,7 +15,7 @@ from dearig.input_file import parse_json, read_input
 from dearig.progress import Progress, quiet
 from dearig.report.made import made_by
 from dearig.report.pages.seal import check_page
-from dearig.report.stored import Stored, restored, stored_in
+from dearig.report.stored import StoredReport, restored, stored_in
 
 if TYPE_CHECKING:
     from dearig.report.pages.html import Picture
@@ -35,7 +35,7 @@ class PrintedFigure:
     caption: str
 
 
-def read_result(path: Path) -> Stored:
+def read_result(path: Path) -> StoredReport:
     """Return the result in the report or the JSON file at ``path``. Raises ``InputError``."""
     try:
         text = read_input(path, "report", _LARGEST).decode("utf-8")
@@ -68,7 +68,7 @@ def write_again(source: Path, out: Path, overwrite: bool = False) -> Path:
 
 
 def write_figures(
-    result: Stored, kind: str, columns: int, folder: Path, progress: Progress = quiet
+    result: StoredReport, kind: str, columns: int, folder: Path, progress: Progress = quiet
 ) -> tuple[tuple[PrintedFigure, ...], Path]:
     """Draw the figures of ``result`` for print, into ``folder``.
 
@@ -114,7 +114,7 @@ def _of_this_version() -> Iterator[None]:
         ) from error
 
 
-def _page_of(result: Stored) -> tuple[str, Callable[[], dict[str, Any]]]:
+def _page_of(result: StoredReport) -> tuple[str, Callable[[], dict[str, Any]]]:
     """Return the template of a result's page, and what makes its values."""
     from dearig.report.pages.diagnosis import diagnosis_contents
     from dearig.report.pages.html import fits_contents

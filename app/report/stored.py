@@ -28,7 +28,7 @@ from dearig.errors import DearigError, InputError
 from dearig.input_file import parse_json
 from dearig.report.made import Made
 
-__all__ = ["FORMAT", "Outcome", "Stored", "restored", "stored", "stored_in", "stored_url"]
+__all__ = ["FORMAT", "Outcome", "StoredReport", "restored", "stored", "stored_in", "stored_url"]
 
 FORMAT = "dearig-report/1"
 
@@ -50,7 +50,7 @@ _NOT_FINITE = types.MappingProxyType(
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredReport:
     """Outcomes of one report, in the order of its parts, and what ``made`` them."""
 
     outcomes: tuple[Outcome, ...]
@@ -72,7 +72,7 @@ def stored(outcomes: Sequence[Outcome], made: Made) -> str:
     return base64.b64encode(packed).decode("ascii")
 
 
-def restored(text: str, name: str) -> Stored:
+def restored(text: str, name: str) -> StoredReport:
     """Return what ``stored`` has written. Raises ``InputError`` with the ``name`` of its file."""
     try:
         document, arrays = _opened(text, name)
@@ -81,7 +81,7 @@ def restored(text: str, name: str) -> Stored:
         )
         if not outcomes:
             raise ValueError("no result")  # noqa: TRY301  (it is told as all others are)
-        return Stored(outcomes, _value(Made, document["made"], []))
+        return StoredReport(outcomes, _value(Made, document["made"], []))
     except InputError:
         raise
     except (

@@ -18,7 +18,7 @@ from dearig.model.fitting.channels import ChannelCurve
 from dearig.model.readings.measures import Errors
 from dearig.model.residual import Dependence, MissingStress
 from dearig.progress import Progress, quiet
-from dearig.recording.files import in_words, replaced_when_done
+from dearig.recording.files import replaced_when_done, system_text
 from dearig.recording.json_file import write_json
 from dearig.report.pages.page import write_report
 from dearig.report.study_view import Pair, Pieces, StudyView, view_of
@@ -88,7 +88,7 @@ def open_study(folder: Path) -> StudyView:
         with np.load(_checked_curves(folder), allow_pickle=False) as arrays:
             return _view(folder, words, {name: arrays[name] for name in arrays.files})
     except OSError as error:
-        raise InputError(f"{folder / _CURVES} cannot be read: {in_words(error)}") from error
+        raise InputError(f"{folder / _CURVES} cannot be read: {system_text(error)}") from error
     except (KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:
         raise InputError(
             f"{folder / _WORDS} and {_CURVES} do not belong together, or are damaged ({error}); "
@@ -103,7 +103,7 @@ def studies_in(folder: Path) -> tuple[StudyEntry, ...]:
         paths = [p for p in folder.glob(f"*/{_WORDS}") if p.is_file()]
         paths.sort(key=lambda path: -path.stat().st_mtime)
     except OSError as error:
-        raise InputError(f"{folder} cannot be read: {in_words(error)}") from error
+        raise InputError(f"{folder} cannot be read: {system_text(error)}") from error
     for path in paths:
         try:
             words = _read_words(path.parent)

@@ -13,7 +13,7 @@ from dearig.batch.watching import SourceWatch
 from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.input_file import read_input
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 
 if TYPE_CHECKING:
     from uvicorn import Server
@@ -114,7 +114,7 @@ def _listen(host: str, port: int) -> socket.socket:
         return socket.create_server((host, port), family=family, backlog=100)
     except OSError as error:
         raise InputError(
-            f"the page cannot be shown at {host}, port {port}: {in_words(error)}; give another "
+            f"the page cannot be shown at {host}, port {port}: {system_text(error)}; give another "
             f"port, or 0 for a free one",
             option="port",
         ) from error

@@ -13,7 +13,7 @@ from dearig.batch.watching import RECENT, Bins, Seen, SourceWatch
 from dearig.errors import InputError
 from dearig.printable import printable
 from dearig.report.pages.campaign import campaign_summary, campaign_table, duration_text
-from dearig.report.pages.watch_state import ShownChannel, in_order, shown_channel
+from dearig.report.pages.watch_state import WatchedChannel, in_order, shown_channel
 
 __all__ = ["look"]
 
@@ -122,14 +122,14 @@ def _recording(state: Seen) -> dict[str, Any]:
     }
 
 
-def _channel(state: Seen, name: str, shown: ShownChannel) -> dict[str, Any]:
+def _channel(state: Seen, name: str, shown: WatchedChannel) -> dict[str, Any]:
     return {
         "label": _text(shown.label), "unit": _text(shown.unit),
         "value": shown.text(state.now[name]), "peak": shown.text(state.peak[name]),
     }  # fmt: skip
 
 
-def _plots(state: Seen, shown: dict[str, ShownChannel]) -> list[dict[str, Any]]:
+def _plots(state: Seen, shown: dict[str, WatchedChannel]) -> list[dict[str, Any]]:
     """Return a plot for each quantity: a command with its monitor, a measurement with its model."""
     groups: dict[str, list[str]] = {}
     for name in shown:
@@ -153,7 +153,7 @@ def _plots(state: Seen, shown: dict[str, ShownChannel]) -> list[dict[str, Any]]:
     ]
 
 
-def _line(bins: Bins, shown: ShownChannel) -> dict[str, Any]:
+def _line(bins: Bins, shown: WatchedChannel) -> dict[str, Any]:
     """Return start and width of the bins in s, and their ends; null where a bin has no value."""
     start, low, high = bins.dense()
     low, high = low * shown.factor, high * shown.factor

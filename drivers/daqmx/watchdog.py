@@ -36,18 +36,18 @@ def watchdog_finding(
     A real card needs a watchdog or the declaration that there is none. One behind a ``server``
     that was not reached may be simulated.
     """
-    words = watchdog_text(card, simulated)
+    text = watchdog_text(card, simulated)
     verdict: Verdict
     if card.watchdog_s:
-        return Finding(instrument, WATCHDOG, words)
+        return Finding(instrument, WATCHDOG, text)
     if card.i_have_no_watchdog:
         advice = "wire card.do_hv_enable to the amplifier's enable input to have one"
-        return Finding(instrument, WATCHDOG, words, verdict="warning", advice=advice)
+        return Finding(instrument, WATCHDOG, text, verdict="warning", advice=advice)
     if simulated:
-        return Finding(instrument, WATCHDOG, words, verdict="not wired")
+        return Finding(instrument, WATCHDOG, text, verdict="not wired")
     verdict = "warning" if simulated is None and server is not None else "wrong"
     return Finding(
-        instrument, WATCHDOG, words, verdict=verdict,
+        instrument, WATCHDOG, text, verdict=verdict,
         advice="wire a digital line to the amplifier's enable input and write card.do_hv_enable, "
         "or write i_have_no_watchdog = true in [card] of the rig file to run without",
     )  # fmt: skip

@@ -161,8 +161,8 @@ class RoomLimits:
             action = self._settings.limit_action
             if interlock == "thermohygrometer":
                 action = "at once" if self._settings.on_loss == "at once" else "ramp"
-            words = f"at {sample / self._rate:.4g} s {sentence}"
-            trips.append(Trip(interlock, sample, action, words))
+            text = f"at {sample / self._rate:.4g} s {sentence}"
+            trips.append(Trip(interlock, sample, action, text))
         return trips
 
 

@@ -40,7 +40,7 @@ from dearig.model.kernel.balance import carried_stress
 from dearig.model.kinematics import electric_along, thinning
 from dearig.model.simulation.actuator import (
     NO_AIR,
-    STATUS_WORDS,
+    STATUS_TEXTS,
     Actuator,
     Drive,
     at_rest,
@@ -202,7 +202,7 @@ class _Job:
         self.c = model.coefficients()
         status, self.rest = at_rest(self.c)
         if status != OK:
-            raise ModelError(STATUS_WORDS[status])
+            raise ModelError(STATUS_TEXTS[status])
         highest = self._highest_displacement()
         self.pulls_in = self.target > highest
         self.smooth = low_pass(np.minimum(self.target, highest), self.rate, self.bandwidth)

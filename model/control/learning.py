@@ -160,7 +160,7 @@ class Learner:
         self._now = self.first
         self._known = np.zeros(self.first.time.size)
         self._ratio = np.ones(self._frequency.size, dtype=complex)  # see _film_over_model
-        self._told_up_to = 1  # line
+        self._stated_up_to = 1  # line
         self._best: _Run | None = None
         self._lacking: list[np.ndarray] = []  # raw, of the last runs
         self._learned: _Step | None = None  # the last step
@@ -222,7 +222,7 @@ class Learner:
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
         best = self._best
         if best is None:
-            self._ratio, self._told_up_to = self._film_over_model(lacking)
+            self._ratio, self._stated_up_to = self._film_over_model(lacking)
         left = np.abs(np.fft.rfft(error))
         edge = 0.0 if self._learned is None else self._learned.edge
         run = _Run(self._now, self._known, lacking, rms, error, counted, left, edge)
@@ -387,7 +387,7 @@ class Learner:
             return np.full(shown.size, np.inf), np.zeros(shown.size, dtype=bool)
         ratio = np.sqrt(np.maximum(shown - noise, 0.0)[told] / predicted[told])
         lines = np.arange(shown.size)
-        off, last = np.interp(lines, told, ratio), self._told_up_to
+        off, last = np.interp(lines, told, ratio), self._stated_up_to
         # what the ratio corrects for at the last line of the path grows beyond it
         corrected = abs(self._ratio[last] / abs(self._ratio[0]) - 1.0)
         grown = max(off[last], corrected) * (lines / last) ** 2

@@ -393,8 +393,8 @@ def unnamed_of(
     if not own:
         return describe_unnamed(missing, after)
     numbers = "; ".join(f"{s.effect} ({_values(s)})" for s in own)
-    words = "; ".join(EFFECTS[s.effect].summary for s in own)
-    return Unnamed(own[0].acts_on, numbers, f"{words}. Residual: {looks(after)}")
+    text = "; ".join(EFFECTS[s.effect].summary for s in own)
+    return Unnamed(own[0].acts_on, numbers, f"{text}. Residual: {looks(after)}")
 
 
 def _values(step: Step) -> str:

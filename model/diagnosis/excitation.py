@@ -24,12 +24,12 @@ from dearig.model.verdict import TOLERANCE
 __all__ = [
     "BANDS",
     "LEVELS",
-    "Band",
     "Beyond",
     "Excitation",
-    "Motion",
-    "Shown",
+    "FrequencyBand",
+    "PredictedRun",
     "Tested",
+    "TrainingRange",
     "excitation",
     "range_of",
     "shown_by",
@@ -45,7 +45,7 @@ _LEVEL_RATIO = 1.05  # of the highest voltage to that of the training recordings
 
 
 @dataclass(frozen=True)
-class Motion:
+class PredictedRun:
     """One recording: ``drive`` (N,) V and what a model makes of it, ``response`` (N,) m.
 
     Samples are ``step`` s apart; ``noise`` m is the standard deviation of one reading.
@@ -72,7 +72,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Band:
+class FrequencyBand:
     """A band of frequency, in Hz: what a recording asks there, and what training has shown.
 
     ``asked`` is the RMS of the response over the whole recording, in noises; ``known`` is the
@@ -101,7 +101,7 @@ class Excitation:
     """
 
     name: str
-    bands: tuple[Band, ...]
+    bands: tuple[FrequencyBand, ...]
     shown: tuple[float, ...]
     above: float = 0.0
 
@@ -116,7 +116,7 @@ class Excitation:
         return math.sqrt(sum(b.open for b in self.bands))
 
     @property
-    def undetermined(self) -> tuple[Band, ...]:
+    def undetermined(self) -> tuple[FrequencyBand, ...]:
         """Bands that training does not determine, of rising frequency.
 
         Without them, what is left open would be noise.
@@ -141,7 +141,7 @@ class Excitation:
             return LEVELS
         return BANDS if self.share > _HALF else ""
 
-    def after(self, motion: Motion) -> Excitation:
+    def after(self, motion: PredictedRun) -> Excitation:
         """Return what is asked, if training had one more recording with this ``motion``."""
         shown = motion.energies(self.edges) + np.array(self.shown)
         bands = (replace(b, known=float(k)) for b, k in zip(self.bands, _known(shown), strict=True))
@@ -170,11 +170,11 @@ class Beyond:
     """
 
     levels: bool
-    bands: tuple[Band, ...]
+    bands: tuple[FrequencyBand, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class TrainingRange:
     """What training recordings have shown, also without them.
 
     ``energies`` (B,) are their sums of squares in units of the noise in bands with ``edges``
@@ -187,13 +187,13 @@ class Shown:
     low: float
     high: float
 
-    def further(self, asked: Motion) -> np.ndarray:
+    def further(self, asked: PredictedRun) -> np.ndarray:
         """Return where ``asked`` goes to levels that training does not reach, (N,) bool."""
         further = np.abs(asked.drive) > _LEVEL_RATIO * self.voltage
         further |= asked.response < self.low - asked.noise
         return np.asarray(further | (asked.response > self.high + asked.noise))
 
-    def beyond(self, asked: Motion) -> Beyond | None:
+    def beyond(self, asked: PredictedRun) -> Beyond | None:
         """Return where ``asked`` goes beyond training; None where it does not.
 
         As a voltage may be, a displacement may be higher by a part that is not counted.
@@ -205,7 +205,7 @@ class Shown:
         asks = asked.energies(edges) / asked.response.size
         known = _known(shown)
         bands = tuple(
-            Band(float(low), float(high), math.sqrt(a), float(k), 0.0)
+            FrequencyBand(float(low), float(high), math.sqrt(a), float(k), 0.0)
             for low, high, a, k in zip(edges[:-1], edges[1:], asks, known, strict=True)
         )
         more = (_LEVEL_RATIO - 1.0) * (self.high - self.low)
@@ -214,10 +214,10 @@ class Shown:
         return found if found.levels or found.bands else None
 
 
-def shown_by(train: Sequence[Motion], edges: np.ndarray | None = None) -> Shown:
+def shown_by(train: Sequence[PredictedRun], edges: np.ndarray | None = None) -> TrainingRange:
     """Return what the recordings ``train`` have shown, in bands with ``edges`` (B + 1,) Hz."""
     edges = _edges(train) if edges is None else edges
-    return Shown(
+    return TrainingRange(
         edges,
         np.sum([motion.energies(edges) for motion in train], axis=0),
         max(float(np.max(np.abs(m.drive))) for m in train),
@@ -226,7 +226,7 @@ def shown_by(train: Sequence[Motion], edges: np.ndarray | None = None) -> Shown:
     )
 
 
-def excitation(train: Sequence[Motion], asked: Motion, error: np.ndarray) -> Excitation:
+def excitation(train: Sequence[PredictedRun], asked: PredictedRun, error: np.ndarray) -> Excitation:
     """Return what the recording ``asked`` asks beyond ``train``.
 
     ``error`` (N,) m is measured minus model there, NaN where a reading must not be used.
@@ -241,7 +241,7 @@ def excitation(train: Sequence[Motion], asked: Motion, error: np.ndarray) -> Exc
     # noise that is white has its power in proportion to the frequencies of a band
     noise = np.diff(np.minimum(edges, 0.5 / asked.step)) * 2.0 * asked.step
     bands = tuple(
-        Band(float(low), float(high), math.sqrt(a), float(k), float(e - n))
+        FrequencyBand(float(low), float(high), math.sqrt(a), float(k), float(e - n))
         for low, high, a, k, e, n in zip(
             edges[:-1], edges[1:], asks, known, errs, noise * np.mean(good), strict=True
         )
@@ -252,7 +252,7 @@ def excitation(train: Sequence[Motion], asked: Motion, error: np.ndarray) -> Exc
     return Excitation(asked.name, bands, tuple(shown.energies.tolist()), above)
 
 
-def range_of(motions: Iterable[Motion]) -> Tested:
+def range_of(motions: Iterable[PredictedRun]) -> Tested:
     """Return how far recordings of these ``motions`` test a model together."""
     every = list(motions)
     edges = _edges(every)
@@ -268,7 +268,7 @@ def range_of(motions: Iterable[Motion]) -> Tested:
     )
 
 
-def _undetermined(bands: Sequence[Band]) -> tuple[Band, ...]:
+def _undetermined(bands: Sequence[FrequencyBand]) -> tuple[FrequencyBand, ...]:
     """Return those of ``bands`` without which what training leaves open would be noise."""
     left, found = sum(b.open for b in bands), []
     for band in sorted(bands, key=lambda b: -b.open):
@@ -284,7 +284,7 @@ def _known(shown: np.ndarray) -> np.ndarray:
     return np.sqrt(np.minimum(1.0, _COMPONENTS / np.maximum(shown, _COMPONENTS)))
 
 
-def _edges(motions: Sequence[Motion]) -> np.ndarray:
+def _edges(motions: Sequence[PredictedRun]) -> np.ndarray:
     """Return the edges of octaves, from one period of the longest recording to the fastest rate."""
     longest = max(m.step * m.response.size for m in motions)
     highest = 0.5 / min(m.step for m in motions)

@@ -53,7 +53,7 @@ MOVES_MAX = 3
 _END_STATED = "the interval ends at a stated bound"
 _END_OF_LAW = "the interval ends where the range of its law does"
 _FIXED = "fixed"
-_J_WORDS = "no spring stiffens measurably at these stretches: only a lower bound"
+_J_TEXT = "no spring stiffens measurably at these stretches: only a lower bound"
 _AT_END = 1e-9  # of a coordinate: a descent clips to the bound itself
 
 
@@ -227,7 +227,7 @@ def _estimate(
     determined = is_determined(low, high) and not at_end
     note = "" if determined else open_text(low, high)
     if held:
-        note = _J_WORDS if low > 0.0 else OPEN
+        note = _J_TEXT if low > 0.0 else OPEN
     elif at_end:
         note = end_text(q, value)
     elif not followed:

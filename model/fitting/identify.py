@@ -174,8 +174,8 @@ def identify(
     fit, held_limits = fit_globally(problem, nested, progress)
     held_limits = held_limits & ~layout.fixed
     limits = tuple(n for n, h in zip(layout.names, held_limits, strict=True) if h)
-    words = "no interval was asked for"
-    result = _result(problem, method, fit, layout.values(fit.x), words, limits)
+    text = "no interval was asked for"
+    result = _result(problem, method, fit, layout.values(fit.x), text, limits)
     return add_intervals(records, result, workers, progress) if intervals else result
 
 

@@ -41,7 +41,7 @@ _NORMAL_95 = math.sqrt(CHI2_95)
 #: Least eigenvalue of a normal matrix, in units of its diagonal, of a direction that the data
 #: determine. Derivatives by differences are known to some 1e-5; a smaller eigenvalue is the square
 #: of their error.
-_TOLD = 1e-10
+_FIRM = 1e-10
 _DETERMINED_RATIO = 5.0  # ratio of the ends of an interval, above which a value is not quoted
 _POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: tolerance of its crossing
@@ -194,7 +194,7 @@ def _inverse(normal: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.n
 
 def _pseudo_inverse(normal: np.ndarray) -> np.ndarray:
     """Return the inverse of ``normal`` (f, f), 0 along directions that are not determined."""
-    return _inverse(normal, lambda w: np.where(w > _TOLD, 1.0 / np.maximum(w, _TOLD), 0.0))
+    return _inverse(normal, lambda w: np.where(w > _FIRM, 1.0 / np.maximum(w, _FIRM), 0.0))
 
 
 def firm_directions(

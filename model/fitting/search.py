@@ -435,12 +435,12 @@ def _ranked(layout: FitLayout, found: list[tuple[float, np.ndarray]], starts: in
         )
     kept: list[np.ndarray] = []
     # times and limits are logarithmic; a shape has a scale of its own
-    told_apart = np.concatenate([layout.column("T"), np.flatnonzero(layout.shapes)])
-    scale = np.array([layout.quantities[j].typical or 1.0 for j in told_apart])
+    compared = np.concatenate([layout.column("T"), np.flatnonzero(layout.shapes)])
+    scale = np.array([layout.quantities[j].typical or 1.0 for j in compared])
     for _, x in sorted(found, key=lambda f: f[0]):
         start = np.clip(x, layout.lower, layout.upper)
         # the moduli follow from the times and shapes: they are not compared
-        far = [np.max(np.abs((start - k)[told_apart]) / scale, initial=0) > 0.7 for k in kept]
+        far = [np.max(np.abs((start - k)[compared]) / scale, initial=0) > 0.7 for k in kept]
         if all(far):
             kept.append(start)
         if len(kept) == starts:

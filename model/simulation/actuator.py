@@ -29,7 +29,7 @@ from dearig.model.kinematics import thinning
 
 __all__ = [
     "NO_AIR",
-    "STATUS_WORDS",
+    "STATUS_TEXTS",
     "Actuator",
     "Drive",
     "Response",
@@ -41,7 +41,7 @@ __all__ = [
     "readings_of",
 ]
 
-STATUS_WORDS = MappingProxyType(
+STATUS_TEXTS = MappingProxyType(
     {
         kernel.OK: "ok",
         kernel.PULL_IN: "pull-in: the field exceeded the film's stiffness and the stretch ran away",
@@ -142,9 +142,9 @@ class Response:
         return self.status == kernel.OK
 
     @property
-    def in_words(self) -> str:
-        """The status in words, with the time at which it occurred."""
-        words = STATUS_WORDS[self.status]
+    def status_text(self) -> str:
+        """Text of the status, with the time at which it occurred."""
+        words = STATUS_TEXTS[self.status]
         if self.ok:
             return words
         return f"{words} (at {self.time[min(self.reached, self.time.size - 1)]:.4g} s)"
@@ -186,7 +186,7 @@ class Actuator:
         status, stretch = kernel.rest_stretch(self.coefficients(), 0.0)
         if status != kernel.OK:
             raise ModelError(
-                f"{STATUS_WORDS[status]} (mu_0 = {self.network.equilibrium.modulus:.4g} Pa under "
+                f"{STATUS_TEXTS[status]} (mu_0 = {self.network.equilibrium.modulus:.4g} Pa under "
                 f"{self.load.weight:.4g} N)"
             )
         return stretch

@@ -498,20 +498,20 @@ def join(
         segment = open_segment.after(end)
         if abs(segment.start - end) > _JOIN_TOLERANCE:
             before = f"{label(i - 1)} ends" if i else "the lead-in ends"
-            words = (
+            text = (
                 f"{label(i)} starts at {segment.start * 1e-3:.6g} kV but {before} at "
                 f"{end * 1e-3:.6g} kV: put a ramp between them"
             )
-            faults.append((i, words))
+            faults.append((i, text))
         end = segment.end
         joined.append(segment)
     if abs(end) > _JOIN_TOLERANCE:
         last = len(joined) - 1
-        words = (
+        text = (
             f"{label(last)} ends at {end * 1e-3:.6g} kV but the run ends at 0 kV: put a ramp to 0 "
             f"at the end"
         )
-        faults.append((last, words))
+        faults.append((last, text))
     return joined, faults
 
 

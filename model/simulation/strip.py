@@ -14,7 +14,7 @@ from dearig.model.errors import ModelError
 from dearig.model.film.material import Network
 from dearig.model.film.network import HEAD
 from dearig.model.film.specimen import KINEMATICS
-from dearig.model.simulation.actuator import STATUS_WORDS, effect_values
+from dearig.model.simulation.actuator import STATUS_TEXTS, effect_values
 from dearig.model.simulation.film_kernel import add_effects, drive_by_stretch
 
 __all__ = ["StressResponse", "Strip", "stress_of", "unit_stresses"]
@@ -34,9 +34,9 @@ class StressResponse:
         return self.status == kernel.OK
 
     @property
-    def in_words(self) -> str:
-        """The status in words."""
-        return STATUS_WORDS[self.status]
+    def status_text(self) -> str:
+        """Text of the status."""
+        return STATUS_TEXTS[self.status]
 
 
 @dataclass(frozen=True)

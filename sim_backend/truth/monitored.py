@@ -32,8 +32,8 @@ def with_monitor(effect: TruthEffect, seed: int) -> TruthEffect:
         return effect
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM,)))
     seen = bool(generator.random() < 0.5) and not _ends_runs(stage)
-    words = "shown by the voltage monitor" if seen else "not shown by the voltage monitor"
-    return replace(effect, seen=seen, description=f"{effect.description} ({words})")
+    text = "shown by the voltage monitor" if seen else "not shown by the voltage monitor"
+    return replace(effect, seen=seen, description=f"{effect.description} ({text})")
 
 
 def _ends_runs(stage: SupplyStage) -> bool:

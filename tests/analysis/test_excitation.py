@@ -14,7 +14,7 @@ from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, Evaluation
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.settings import CardSettings
-from dearig.model.diagnosis.excitation import Motion
+from dearig.model.diagnosis.excitation import PredictedRun
 from dearig.model.readings.measures import errors
 from dearig.model.simulation.actuator import Drive
 from dearig.report.as_json import diagnosis_json
@@ -75,7 +75,7 @@ def test_the_proposed_record_passes_the_gate_and_would_show_it() -> None:
     time = np.arange(waveform.samples) / waveform.rate
     assert found.determining.seconds == pytest.approx(waveform.duration)
     moved = FILM.simulate(Drive(time, waveform.window(), hold=True)).displacement
-    more = Motion("more", 1.0 / waveform.rate, waveform.window(), moved, NOISE)
+    more = PredictedRun("more", 1.0 / waveform.rate, waveform.window(), moved, NOISE)
     (asked,) = found.undetermined
     assert asked.after(more).undetermined == ()
     # what is determined is not asked for

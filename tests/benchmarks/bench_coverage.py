@@ -111,7 +111,7 @@ def record_of(model: Actuator, noise: float, rate: float, seed: int, hold: bool)
     drive = Drive(*Sequence.thesis().sample(rate), hold=hold)
     answer = model.simulate(drive)
     if not answer.ok:
-        raise RuntimeError(f"rig {seed}: {answer.in_words}")
+        raise RuntimeError(f"rig {seed}: {answer.status_text}")
     rng = np.random.default_rng((seed, 1))
     read = answer.displacement + noise * rng.standard_normal(drive.time.size)
     read = CONVERTER_STEP * np.round(read / CONVERTER_STEP)

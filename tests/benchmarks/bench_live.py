@@ -24,7 +24,7 @@ from PySide6.QtWidgets import QApplication
 
 from dearig.window.jobs.collector import Collector
 from dearig.window.kit.theme import LIGHT, apply, prepare_plots
-from dearig.window.run.pace import Pace
+from dearig.window.run.pace import ShownTime
 from dearig.window.run.page import RunPage
 from dearig.window.sequence.planner import Planner
 from dearig.window.session.state import Session
@@ -113,8 +113,8 @@ def main() -> None:
     print("|---|---|---|---|---|")
     for words, span, after in SPANS:
         for flows in (False, True):
-            shown = Pace.shown if flows else (lambda _, end, __: end)
-            with patch.object(Pace, "shown", shown):
+            shown = ShownTime.shown if flows else (lambda _, end, __: end)
+            with patch.object(ShownTime, "shown", shown):
                 rate, cost, worst = measure(span, after, given.seconds, (width, height))
             how = "flows" if flows else "block by block"
             print(f"| {words} | {how} | {rate:.1f} | {cost:.1f} | {worst:.0f} |", flush=True)

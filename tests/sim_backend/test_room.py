@@ -8,21 +8,21 @@ import pytest
 from dearig.drivers.instruments.thermohygrometer import ThermohygrometerError
 from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
 from dearig.sim_backend.faults import FaultPlan
-from dearig.sim_backend.room import Air, SimulatedSource, still_air, time_in_room
+from dearig.sim_backend.room import AirOfRoom, SimulatedSource, still_air, time_in_room
 
 SENSOR = ThermohygrometerSettings(interval_s=1.0, stale_s=3.0)
 HOUR = 3600.0
 
 
 def test_the_day_is_warmest_and_driest_in_the_afternoon() -> None:
-    air = Air(RoomSettings(daily_K=3.0, daily_percent=8.0))
+    air = AirOfRoom(RoomSettings(daily_K=3.0, daily_percent=8.0))
     at = np.array([3.0, 9.0, 15.0, 39.0]) * HOUR
     np.testing.assert_allclose(air.temperature(at), [19.0, 22.0, 25.0, 25.0], atol=1e-9)
     np.testing.assert_allclose(air.humidity(at), [53.0, 45.0, 37.0, 37.0], atol=1e-9)
 
 
 def test_the_heating_warms_and_dries_in_its_cycle() -> None:
-    air = Air(RoomSettings(heating_K=2.0, heating_percent=6.0, heating_period_min=30.0))
+    air = AirOfRoom(RoomSettings(heating_K=2.0, heating_percent=6.0, heating_period_min=30.0))
     at = np.linspace(0.0, 4 * 1800.0, 4001)
     warm, moist = air.temperature(at), air.humidity(at)
     assert np.ptp(warm) == pytest.approx(2.0, rel=1e-3)
@@ -34,12 +34,12 @@ def test_the_heating_warms_and_dries_in_its_cycle() -> None:
 def test_the_weather_follows_its_seed_and_the_past_is_known() -> None:
     settings = RoomSettings(weather_K=2.0, weather_percent=5.0)
     at = np.linspace(-100.0 * 24 * HOUR, 100.0 * 24 * HOUR, 5000)
-    same = Air(settings).humidity(at)
-    np.testing.assert_array_equal(same, Air(settings).humidity(at))
-    other = Air(settings.model_copy(update={"seed": 1})).humidity(at)
+    same = AirOfRoom(settings).humidity(at)
+    np.testing.assert_array_equal(same, AirOfRoom(settings).humidity(at))
+    other = AirOfRoom(settings.model_copy(update={"seed": 1})).humidity(at)
     assert np.abs(same - other).max() > 1.0
     assert np.std(same) == pytest.approx(5.0, rel=0.3)
-    assert np.std(Air(settings).temperature(at)) == pytest.approx(2.0, rel=0.3)
+    assert np.std(AirOfRoom(settings).temperature(at)) == pytest.approx(2.0, rel=0.3)
 
 
 def test_runs_advance_the_time_in_the_room() -> None:
@@ -50,7 +50,7 @@ def test_runs_advance_the_time_in_the_room() -> None:
 
 
 def test_a_sensor_reads_the_room_every_interval() -> None:
-    air = Air(RoomSettings(heating_K=5.0, heating_period_min=1.0))
+    air = AirOfRoom(RoomSettings(heating_K=5.0, heating_period_min=1.0))
     source = SimulatedSource(SENSOR, air)
     first = source.reading(0.0)
     assert first.age == 0.0

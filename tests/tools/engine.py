@@ -44,7 +44,7 @@ def record_of(
     """What ``model`` shows on the thesis's excitation, with noise."""
     drive = drive or thesis_drive()
     answer = model.simulate(drive)
-    assert answer.ok, answer.in_words
+    assert answer.ok, answer.status_text
     rng = np.random.default_rng(seed)
     noisy = answer.displacement + noise * rng.standard_normal(drive.time.size)
     return ActuatorRecord("made", drive, noisy, noise)
@@ -65,7 +65,7 @@ def film_record_of(model: Strip, seed: int = 0, noise: float = FILM_NOISE) -> Fi
     corners = [0.0, 5.0, 6.0, 12.0, 20.0, 30.0, 31.0, 40.0]
     stretch = np.interp(time, corners, [1.0, 1.5, 1.05, 1.05, 1.9, 1.9, 1.05, 1.05])
     answer = model.simulate(time, stretch)
-    assert answer.ok, answer.in_words
+    assert answer.ok, answer.status_text
     rng = np.random.default_rng(seed)
     noisy = answer.stress + noise * rng.standard_normal(time.size)
     return FilmRecord("strip", time, stretch, noisy, noise)

@@ -15,7 +15,7 @@ TOLERANCE = 0.1e-6  # m
 def error(actuator, time, voltage, hold=False):
     """Largest error of the displacement against SciPy in m."""
     response = actuator.simulate(Drive(time, voltage, hold))
-    assert response.ok, response.in_words
+    assert response.ok, response.status_text
     expected = solve(actuator, time, voltage, hold)
     assert response.rest_stretch == pytest.approx(expected[0], abs=1e-12)
     return np.abs(response.stretch - expected).max() * actuator.film.length

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
     from dearig.analysis.outcomes import Comparison, Evaluation
     from dearig.analysis.readings.record import Readings
-    from dearig.model.diagnosis.excitation import Beyond, Motion, Shown
+    from dearig.model.diagnosis.excitation import Beyond, PredictedRun, TrainingRange
     from dearig.model.diagnosis.results import Stage
 
 __all__ = [
@@ -145,7 +145,7 @@ def _law_error(comparisons: Sequence[Comparison], noise: float) -> float:
     return math.sqrt(sum(squares) / len(squares)) if squares else 0.0
 
 
-def motion_of(comparison: Comparison, noise: float) -> Motion:
+def motion_of(comparison: Comparison, noise: float) -> PredictedRun:
     """Return the motion of the model under a recording; ``noise`` is at least that of a reading."""
     return _motion(
         comparison.name, comparison.time, comparison.drive, comparison.model,
@@ -155,11 +155,11 @@ def motion_of(comparison: Comparison, noise: float) -> Motion:
 
 def _motion(
     name: str, time: np.ndarray, drive: np.ndarray, response: np.ndarray, noise: float
-) -> Motion:
-    from dearig.model.diagnosis.excitation import Motion
+) -> PredictedRun:
+    from dearig.model.diagnosis.excitation import PredictedRun
 
     step = float(np.median(np.diff(time)))
-    return Motion(name, step, np.nan_to_num(drive), response, noise)
+    return PredictedRun(name, step, np.nan_to_num(drive), response, noise)
 
 
 def covariance_of(model: ModelFile) -> tuple[tuple[str, ...], np.ndarray] | None:
@@ -195,7 +195,7 @@ class _Known:
     law: float
     law_of: str
     law_from: tuple[str, ...]
-    shown: Shown | None
+    shown: TrainingRange | None
 
 
 def _known(model: ModelFile) -> _Known:
@@ -225,8 +225,8 @@ def _size(value: Any) -> float:
     return size
 
 
-def _shown(table: Mapping[str, Any]) -> Shown:
-    from dearig.model.diagnosis.excitation import Shown
+def _shown(table: Mapping[str, Any]) -> TrainingRange:
+    from dearig.model.diagnosis.excitation import TrainingRange
 
     edges, energies = (
         np.array([_size(v) for v in table[name]]) for name in ("edges_Hz", "energies_over_noise")
@@ -234,7 +234,7 @@ def _shown(table: Mapping[str, Any]) -> Shown:
     low, high = (float(v) * 1e-6 for v in table["displacement_um"])
     if edges.size != energies.size + 1 or np.any(np.diff(edges) <= 0.0) or not low <= high:
         raise ValueError("the bands that training has shown do not go together")
-    return Shown(edges, energies, _size(table["voltage_kV"]) * 1e3, low, high)
+    return TrainingRange(edges, energies, _size(table["voltage_kV"]) * 1e3, low, high)
 
 
 # ---------------------------------------------------------------- bands

@@ -123,7 +123,7 @@ def _film(readings: Readings, model: Actuator | Strip) -> _Predicted:
         warnings.append(f"the film was held {recording.kinematics}, the model's {model.kinematics}")
     answer = replace(model, kinematics=recording.kinematics).simulate(recording.time, stretch)
     if not answer.ok:
-        raise InputError(f"{recording.path}: the model cannot follow it: {answer.in_words}")
+        raise InputError(f"{recording.path}: the model cannot follow it: {answer.status_text}")
     try:
         readings.known_noise()
     except ModelError as error:
@@ -144,7 +144,7 @@ def _actuator(readings: Readings, model: Actuator | Strip) -> _Predicted:
     drive, valid = readings.voltage, readings.quality.valid
     response = model.simulate(drive, readings.lag)
     if not response.ok:
-        raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
+        raise InputError(f"{recording.path}: the model cannot follow it: {response.status_text}")
     means = mean_about(response.displacement, recording.average)
     predicted = counted(means, readings.lead_in)
     usable = np.ones(predicted.size, dtype=bool) if valid is None else valid

@@ -15,7 +15,7 @@ __all__ = ["Source", "check_named_once", "open_all"]
 #: A recording that was opened, or the path of one.
 Source = str | Path | Recording
 
-_KIND_WORDS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
+_KIND_TEXTS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
 
 
 def open_all(sources: Sequence[Source]) -> list[Recording]:
@@ -41,8 +41,8 @@ def open_all(sources: Sequence[Source]) -> list[Recording]:
         seen[recording.sha256] = recording.path
     kinds = {r.kind for r in recordings}
     if len(kinds) > 1:
-        words = ", ".join(f"{r.path} is of {_KIND_WORDS[r.kind]}" for r in recordings)
-        raise InputError(f"these recordings cannot be used together: {words}")
+        text = ", ".join(f"{r.path} is of {_KIND_TEXTS[r.kind]}" for r in recordings)
+        raise InputError(f"these recordings cannot be used together: {text}")
     return recordings
 
 

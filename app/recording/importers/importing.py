@@ -28,10 +28,10 @@ from dearig.recording.importers.columns.chosen import (
     import_command,
     take_channels,
 )
-from dearig.recording.importers.columns.plausible import doubts
+from dearig.recording.importers.columns.plausible import plausibility_warnings
 from dearig.recording.importers.columns.proposal import first_values
 from dearig.recording.importers.columns.specimen import Specimen
-from dearig.recording.importers.columns.start import Start
+from dearig.recording.importers.columns.start import MeasurementStart
 from dearig.recording.importers.columns.values import Values, values_of
 from dearig.recording.importers.exported import Exported, exported
 from dearig.recording.importers.quantities.units import UnitScale
@@ -109,16 +109,16 @@ class ImportOptions:
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import did: the columns it took, ``notes`` on what it did, ``doubts`` to check."""
+    """What an import did: ``columns`` that were read, ``notes``, ``warnings`` to check."""
 
-    took: tuple[str, ...]
+    columns: tuple[str, ...]
     notes: tuple[str, ...]
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A recording that an import would write: ``values`` with doubts and notes, and metadata."""
+    """A recording that an import would write: ``values`` with warnings and notes, and metadata."""
 
     chosen: Chosen
     values: Values
@@ -128,7 +128,7 @@ class Prepared:
     kinematics: str | None
     rest_reading: float
     events: tuple[Event, ...]
-    start: Start | None = None
+    start: MeasurementStart | None = None
     timing: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
@@ -234,8 +234,8 @@ def prepare(
     noted = _provenance(path, digest.result(), chosen, options)
     start = values.start
     if was.started is not None:
-        start = Start(was.started, "the recording that was exported")
-    noted[START_FROM] = FROM_IMPORT if start is None else start.told_by
+        start = MeasurementStart(was.started, "the recording that was exported")
+    noted[START_FROM] = FROM_IMPORT if start is None else start.stated_by
     noted = {**was.origin, **noted, **metadata.provenance}
     film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
     rest = 0.0
@@ -243,7 +243,7 @@ def prepare(
         # a displacement that was exported is counted from its rest already
         rest = _from_rest(values) if was.rest_reading is None else was.rest_reading
         film = _of_actuator(values, film, metadata.load or was.load, kinematics, noted)
-    values.warnings += [*doubts(values.columns, film), *doubt]
+    values.warnings += [*plausibility_warnings(values.columns, film), *doubt]
     return Prepared(
         chosen,
         values,
@@ -266,7 +266,7 @@ def prepare(
 
 
 def exported_from(table: Source) -> tuple[Exported, list[str]]:
-    """Return the metadata of the recording that ``table`` was exported from, with doubts."""
+    """Return the metadata of the recording that ``table`` was exported from, with warnings."""
     if table.about or not description_path(table.path).is_file():
         return exported(table.about), []
     about = read_description(table.path, file_sha256(table.path))

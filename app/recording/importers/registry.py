@@ -9,7 +9,7 @@ from typing import Any
 from dearig.drivers.registry import Registry
 from dearig.errors import InputError
 from dearig.input_file import open_input
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.importers.importer import HEAD_BYTES, Importer
 from dearig.recording.importers.source import Source
 
@@ -73,7 +73,7 @@ def source_at(path: Path, **options: object) -> Source:
         with open_input(path) as stream:
             head = stream.read(HEAD_BYTES)
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be read: {system_text(error)}") from error
     if not head:
         raise InputError(f"{path} is empty")
     for first, what, remedy in _NOT_READ:

@@ -26,7 +26,7 @@ from dearig.recording.content.pyramid import reduced
 from dearig.recording.content.safe import Refused, dataset, group, item
 from dearig.recording.content.text import text_of
 from dearig.recording.content.timestamps import local_time
-from dearig.recording.files import in_words, journal_of, replaced_when_done
+from dearig.recording.files import journal_of, replaced_when_done, system_text
 from dearig.recording.reading.environment import stored_means
 from dearig.recording.reading.opening import UNREADABLE, identifier_of, read_from
 from dearig.recording.reading.reader import read_events
@@ -228,7 +228,7 @@ def _files(folder: Path, deep: bool) -> tuple[list[tuple[str, int, int]], list[E
                         lost = f"{folder / name} is a link to a file that is not there"
                         unread.append(Entry(name, 0, trouble=lost, passing=True))
         except OSError as error:
-            reason = f"{folder / here} cannot be read: {in_words(error)}"
+            reason = f"{folder / here} cannot be read: {system_text(error)}"
             if not here:
                 raise InputError(reason) from error
             unread.append(Entry(here, 0, trouble=reason, passing=True))

@@ -16,7 +16,7 @@ from dearig.recording.content.layout import IDENTIFIER
 from dearig.recording.content.safe import Refused, dataset
 from dearig.recording.content.superblock import SIZE, flags_of, repair_superblock
 from dearig.recording.content.text import text_of
-from dearig.recording.files import in_words, journal_of, one_line
+from dearig.recording.files import journal_of, one_line, system_text
 
 #: Consistency flag of a file in SWMR mode.
 WRITTEN_IN_ORDER = 4
@@ -127,7 +127,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
                 )
             flags = flags_of(patched.read(SIZE) or b"")
         except OSError as error:
-            raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+            raise InputError(f"{path} cannot be read: {system_text(error)}") from error
         except ValueError as error:
             raise InputError(f"{path} is damaged: {error}") from error
         if flags is None:

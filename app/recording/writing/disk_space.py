@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from dearig.errors import InputError
 from dearig.recording.content.layout import counts_type
-from dearig.recording.files import errno_of, in_words
+from dearig.recording.files import errno_of, system_text
 from dearig.recording.lock import NO_LOCKS
 from dearig.recording.writing.finish import OVERVIEW, PHYSICAL_MAX
 
@@ -78,7 +78,7 @@ def free_bytes(path: str | Path) -> int:
     try:
         return shutil.disk_usage(folder).free
     except OSError as error:
-        raise InputError(f"the disk of {path} does not answer: {in_words(error)}") from error
+        raise InputError(f"the disk of {path} does not answer: {system_text(error)}") from error
 
 
 def check_room(

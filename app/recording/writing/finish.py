@@ -33,7 +33,7 @@ from dearig.recording.content.modelled import keep_modelled
 from dearig.recording.content.physical import Counts
 from dearig.recording.content.pyramid import complete_pyramid
 from dearig.recording.content.text import clip_text, fixed, put_text
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.lock import FileLock, ReplacedError
 from dearig.recording.reading.arrays import Overview
 from dearig.recording.reading.environment import mean_conditions, read_environment
@@ -98,7 +98,7 @@ def finish(
             if content is not None:
                 changes.replace(content.getbuffer())
     except (OSError, RuntimeError) as error:
-        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be written: {system_text(error)}") from error
     return counts.samples
 
 

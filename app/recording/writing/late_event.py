@@ -18,7 +18,7 @@ from dearig.recording.content.layout import (
     name_dimensions,
 )
 from dearig.recording.content.text import clip_text
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.lock import lock_existing
 from dearig.recording.reading.opening import UNREADABLE
 from dearig.recording.reading.reader import is_finished, open_recording
@@ -55,4 +55,4 @@ def add_event(path: str | Path, level: str, message: str) -> None:
             events[-1:] = row
             name_dimensions(file["entry"])
     except UNREADABLE as error:
-        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be written: {system_text(error)}") from error

@@ -56,10 +56,10 @@ from dearig.recording.content.sample import write_sample
 from dearig.recording.content.text import clip_text, fixed, put_text, text_of
 from dearig.recording.files import (
     check_output,
-    in_words,
     keep_permissions,
     put_back,
     set_aside,
+    system_text,
 )
 from dearig.recording.lock import ReplacedError, create_locked
 from dearig.recording.reading.environment import EnvironmentWriter
@@ -400,7 +400,7 @@ class RecordingWriter:
             free = self._free()
         except OSError as error:
             raise DiskFault(
-                f"the disk of {folder} does not answer ({in_words(error)}); check that it is "
+                f"the disk of {folder} does not answer ({system_text(error)}); check that it is "
                 f"connected"
             ) from error
         if lost is not None:
@@ -564,7 +564,7 @@ class RecordingWriter:
                 self._path, lock = rescued(self._lock, self._path)
             except (OSError, InputError) as error:
                 raise DiskFault(
-                    f"{self._lost}; no copy could be saved ({in_words(error)}), and what "
+                    f"{self._lost}; no copy could be saved ({system_text(error)}), and what "
                     f"was recorded is lost"
                 ) from error
         try:
@@ -633,4 +633,4 @@ def _disk_errors(path: Path, kind: type[DearigError] = DiskFault) -> Iterator[No
     except FileExistsError as error:
         raise InputError(f"{path} exists already; choose another name") from error
     except (OSError, RuntimeError) as error:
-        raise kind(f"{path} cannot be written: {in_words(error)}; {advice(error)}") from error
+        raise kind(f"{path} cannot be written: {system_text(error)}; {advice(error)}") from error

@@ -36,7 +36,7 @@ from dearig.model.coefficients import (
 from dearig.model.effects import EFFECTS, MEMORY, PLACES, SENSOR_MEMORY, assembly
 from dearig.model.film.network import HEAD
 from dearig.model.film.sensor import at_sensor
-from dearig.model.simulation.actuator import STATUS_WORDS, Actuator, ends_of
+from dearig.model.simulation.actuator import STATUS_TEXTS, Actuator, ends_of
 from dearig.model.simulation.film_kernel import add_effects, drive_by_stretch
 from dearig.report.model_export.caveats import caveats
 from dearig.report.model_export.gather import gathered
@@ -184,7 +184,7 @@ def python_file(given: ModelFile, version: str) -> str:
             width=WIDTH, memory=MEMORY,
         )  # fmt: skip
         what = "simulate(time, stretch) is the nominal stress of the film under a stretch."
-    words = pprint.pformat(dict(STATUS_WORDS), width=88)
+    words = pprint.pformat(dict(STATUS_TEXTS), width=88)
     return "".join(
         (
             _HEADER.format(

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 from dearig.batch.watching import Seen, SourceWatch
 from dearig.report.pages.campaign import campaign_json
 
-__all__ = ["ShownChannel", "in_order", "shown_channel", "watch_json"]
+__all__ = ["WatchedChannel", "in_order", "shown_channel", "watch_json"]
 
 
-class ShownChannel(NamedTuple):
+class WatchedChannel(NamedTuple):
     """How a channel is shown: ``factor`` makes values in ``unit`` of those in SI units.
 
     ``digits`` are those after the point, None for four significant ones.
@@ -29,21 +29,21 @@ class ShownChannel(NamedTuple):
 
 
 _CHANNELS = {
-    "voltage_command": ShownChannel("command", 1e-3, "kV", 3),
-    "voltage_monitor": ShownChannel("monitor", 1e-3, "kV", 3),
-    "current_monitor": ShownChannel("current", 1e3, "mA", 3),
-    "displacement": ShownChannel("displacement", 1e3, "mm", 4),
-    "displacement_model": ShownChannel("model", 1e3, "mm", 4),
-    "temperature": ShownChannel("temperature", 1.0, "\u00b0C", 2),
+    "voltage_command": WatchedChannel("command", 1e-3, "kV", 3),
+    "voltage_monitor": WatchedChannel("monitor", 1e-3, "kV", 3),
+    "current_monitor": WatchedChannel("current", 1e3, "mA", 3),
+    "displacement": WatchedChannel("displacement", 1e3, "mm", 4),
+    "displacement_model": WatchedChannel("model", 1e3, "mm", 4),
+    "temperature": WatchedChannel("temperature", 1.0, "\u00b0C", 2),
 }
 
 
-def shown_channel(name: str, described: Mapping[str, tuple[str, str]]) -> ShownChannel:
+def shown_channel(name: str, described: Mapping[str, tuple[str, str]]) -> WatchedChannel:
     """Return how the channel ``name`` is shown; ``described`` has units and labels by name."""
     if name in _CHANNELS:
         return _CHANNELS[name]
     unit, label = described.get(name, ("", ""))
-    return ShownChannel(label or name.replace("_", " "), 1.0, "" if unit == "1" else unit, None)
+    return WatchedChannel(label or name.replace("_", " "), 1.0, "" if unit == "1" else unit, None)
 
 
 def in_order(state: Seen) -> list[str]:

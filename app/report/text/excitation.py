@@ -11,7 +11,7 @@ from dearig.report.text.sentences import listed
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import DiagnoseOutcome
-    from dearig.model.diagnosis.excitation import Band
+    from dearig.model.diagnosis.excitation import FrequencyBand
 
 __all__ = ["bands_text", "tested_texts", "undetermined_texts"]
 
@@ -46,7 +46,7 @@ def undetermined_texts(outcome: DiagnoseOutcome) -> Iterator[str]:
         )
 
 
-def bands_text(bands: Sequence[Band]) -> str:
+def bands_text(bands: Sequence[FrequencyBand]) -> str:
     """Return ``bands`` of rising frequency as "at 0.1 to 0.4 Hz and 50 to 100 Hz"."""
     joined: list[list[float]] = []
     for band in bands:

@@ -94,10 +94,10 @@ def describe_model(model: Actuator | Strip) -> str:
     network = model.network
     kinds = sorted({s.kind for s in network.springs})
     springs = listed(map(spring_label, kinds))
-    words = f"{springs} springs with {_counted(len(network.branches), 'relaxation branch')}"
-    words = words.replace("branchs", "branches")
+    text = f"{springs} springs with {_counted(len(network.branches), 'relaxation branch')}"
+    text = text.replace("branchs", "branches")
     effects = [name for name, _ in model.effects]
-    return f"{words}, and {listed(effects)}" if effects else words
+    return f"{text}, and {listed(effects)}" if effects else text
 
 
 def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
@@ -270,19 +270,19 @@ def _error(comparisons: Sequence[Comparison]) -> str:
     else:
         share = f"{_span([c.errors.nrmse_pct for c in comparisons])} % of the measured range"
     largest = max(c.errors.max for c in comparisons)
-    words = (
+    text = (
         f"error in {shown.quantity.lower()} is {significant(rms * shown.error_factor)} "
         f"{shown.error_unit} RMS ({share}) and at most "
         f"{significant(largest * shown.error_factor)} {shown.error_unit}."
     )
     noise = pooled_noise(comparisons)
     if not noise:
-        return f"{words} The noise floor is not known, so the error cannot be compared with it."
+        return f"{text} The noise floor is not known, so the error cannot be compared with it."
     floor = f"{significant(noise * shown.error_factor)} {shown.error_unit}"
     if kind == "actuator" and noise_from(comparisons) != LEAD_IN:
         floor += " (from second differences, not from a lead-in at rest)"
     ratio = pooled_over_noise(comparisons) or 0.0
-    times = f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that"
+    times = f"{text} The noise floor is {floor}: the error is {significant(ratio)} times that"
     p = smallest_p(c.misfit_p for c in comparisons)
     if p is not None and is_rejected(p):
         return (
@@ -290,7 +290,7 @@ def _error(comparisons: Sequence[Comparison]) -> str:
             f"{p_text(p)}."
         )
     if ratio <= _AT_NOISE:
-        return f"{words} The noise floor is {floor}: the residual is almost only noise."
+        return f"{text} The noise floor is {floor}: the residual is almost only noise."
     if p is not None and p < _RARE:
         return (
             f"{times}, which noise as that at rest seldom leaves ({p_text(p)}): too often to "

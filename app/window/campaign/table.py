@@ -24,7 +24,7 @@ from dearig.batch.forecast import Forecast
 from dearig.batch.queue import DONE, LOST, RUNNING, SKIPPED, STOPPED, WAITING, Queue, RunState
 from dearig.config.campaignfile import Campaign
 from dearig.report.text.numbers import significant
-from dearig.window.kit.fields import in_words, shown_value
+from dearig.window.kit.fields import as_labelled, shown_value
 from dearig.window.kit.widgets import plain_tip
 from dearig.window.session.state import Session
 
@@ -132,7 +132,7 @@ def _settings(settings: Mapping[str, Any], warm_up: bool) -> str:
     if warm_up:
         return "warm-up"
     named = ((_SEGMENT.sub(_segment, path), value) for path, value in settings.items())
-    return "; ".join(f"{in_words(name)} {shown_value(value)}" for name, value in named)
+    return "; ".join(f"{as_labelled(name)} {shown_value(value)}" for name, value in named)
 
 
 _SEGMENT = re.compile(r"^segment\.(\d+)\.")

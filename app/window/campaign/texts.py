@@ -29,12 +29,12 @@ def plan_text(found: PlanSurvey) -> str:
         f"{duration_text(forecast.seconds)} without computations"
         + (f", {runs_text(warm)} to warm up" if warm else "")
         + f" · {forecast.size / 1e6:.3g} MB of {forecast.free / 1e9:.3g} GB free"
-        + _told(campaign)
+        + _length_text(campaign)
         + (f"\nAt most {margins}" if margins else "")
     )
 
 
-def _told(campaign: Campaign) -> str:
+def _length_text(campaign: Campaign) -> str:
     """Return whom the plan tells when a run or the campaign ends."""
     notify = campaign.notify
     ways = [f"the program {notify.command[0]}"] if notify.command else []

@@ -27,8 +27,8 @@ from dearig.window.documents.draft import Draft
 from dearig.window.documents.segment_forms import SegmentForms, sequence_forms
 from dearig.window.kit.fields import (
     Typed,
+    as_labelled,
     form_field,
-    in_words,
     read_back,
     read_typed,
     shown_value,
@@ -187,11 +187,11 @@ class SequenceEditor(QWidget):
 
     def show_faults(self, faults: Iterable[SequenceFault]) -> None:
         """Mark every row and field that has a fault, each with its own words."""
-        self._faults = tuple(replace(f, words=in_words(f.words)) for f in faults)
+        self._faults = tuple(replace(f, words=as_labelled(f.words)) for f in faults)
         by_row: dict[int, list[str]] = {}
         for fault in self._faults:
             if fault.row is not None:
-                named = f"{in_words(fault.key)}: {fault.words}" if fault.key else fault.words
+                named = f"{as_labelled(fault.key)}: {fault.words}" if fault.key else fault.words
                 by_row.setdefault(fault.row, []).append(named)
         for row in range(self.table.rowCount()):
             item = self.table.item(row, 0)

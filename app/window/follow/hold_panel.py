@@ -215,8 +215,8 @@ class HoldPanel(QWidget):
     def _failed(self, sentence: str) -> None:
         self._job_ended()
         before = self.message.text()
-        words = f"{sentence[:1].upper()}{sentence[1:]}."
-        self.message.show_text(f"{before}\n{words}" if before else words)
+        text = f"{sentence[:1].upper()}{sentence[1:]}."
+        self.message.show_text(f"{before}\n{text}" if before else text)
 
     @Slot(object)
     def _planned(self, forecast: HoldForecast) -> None:

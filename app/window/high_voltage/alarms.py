@@ -225,11 +225,11 @@ class AcknowledgeBar(QWidget):
     @Slot()
     def _refresh(self) -> None:
         pending, named = self._log.pending, bool(self._session.operator.strip())
-        words = f"{pending} to acknowledge" if pending else ""
+        text = f"{pending} to acknowledge" if pending else ""
         if pending and not named:
-            words += ": enter your name in Operator"
-        self.words.show_text(words)
-        self.words.setVisible(bool(words))
+            text += ": enter your name in Operator"
+        self.words.show_text(text)
+        self.words.setVisible(bool(text))
         self.button.setEnabled(pending > 0 and named)
 
     @Slot()

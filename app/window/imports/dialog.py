@@ -192,7 +192,7 @@ class ImportDialog(QDialog):
         self.table_box.setCurrentIndex(max(self.table_box.findData(content.table), 0))
         for widget in (self.table_box, self.table_label):
             widget.setVisible(bool(tables))
-        self.fields.show_told(content.told, content.is_text)
+        self.fields.show_stated(content.told, content.is_text)
         if first:
             self._signature = self._proposal().signature
             kept = self._memory.recall(self._signature)
@@ -355,10 +355,10 @@ class ImportDialog(QDialog):
             self.said.show_text(with_labels(trouble, self.path))
         else:
             lines = [f"{trial.samples} samples, {trial.duration:.4g} s of {trial.kind} data", ""]
-            lines += [f"• {took}" for took in trial.said.took]
+            lines += [f"• {column}" for column in trial.said.columns]
             lines += [f"• {with_labels(note)}" for note in trial.said.notes]
-            lines += [f"Check: {with_labels(doubt)}" for doubt in trial.said.doubts]
-            self.said.show_text("\n".join(lines), "warn" if trial.said.doubts else "")
+            lines += [f"Check: {with_labels(doubt)}" for doubt in trial.said.warnings]
+            self.said.show_text("\n".join(lines), "warn" if trial.said.warnings else "")
         self._show_state()
 
     # jobs

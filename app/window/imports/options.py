@@ -48,7 +48,7 @@ class ImportFields(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self._told = Specimen()
+        self._stated = Specimen()
         self._kind = ""
         self._there: frozenset[str] = frozenset()
         self._lines: dict[str, QLineEdit] = {}
@@ -76,7 +76,7 @@ class ImportFields(QWidget):
             self.kinematics.addItem(name, name)
         self.kinematics.setToolTip("How the film was held")
         self.take_told = button("", "Enter the sizes that the head of the file tells")
-        self.take_told.clicked.connect(self._take_told)
+        self.take_told.clicked.connect(self._take_stated)
         self.form = QFormLayout()
         self.form.addRow("Names in &line", self.names_line)
         self._add("rate_Hz", "&Rate (Hz)", "Sample rate, in place of a column for time")
@@ -121,8 +121,8 @@ class ImportFields(QWidget):
         area = kind == "film" and "nominal_stress" not in self._there
         for key, needed in (("gauge_length_mm", length), ("area_mm2", area)):
             self.form.setRowVisible(self._lines[key], needed)
-        told = (length and self._told.gauge_length_mm, area and self._told.area_mm2)
-        self.form.setRowVisible(self.take_told, any(told))
+        stated = (length and self._stated.gauge_length_mm, area and self._stated.area_mm2)
+        self.form.setRowVisible(self.take_told, any(stated))
         self.form.setRowVisible(self.film, kind == "actuator")
         for key, _, _ in _FILM:
             self.form.setRowVisible(self._lines[key], given)
@@ -131,14 +131,14 @@ class ImportFields(QWidget):
             0, "uniaxial" if kind == "film" else "as the film says"
         )  # fmt: skip
 
-    def show_told(self, told: Specimen, text: bool) -> None:
-        """Offer the size ``told`` by the file's head; ``text``: it has a line of names."""
-        self._told = told
+    def show_stated(self, stated: Specimen, text: bool) -> None:
+        """Offer the size ``stated`` by the file's head; ``text``: it has a line of names."""
+        self._stated = stated
         parts = []
-        if told.gauge_length_mm is not None:
-            parts.append(f"length {told.gauge_length_mm:g} mm")
-        if told.area_mm2 is not None:
-            parts.append(f"cross-section {told.area_mm2:g} mm²")
+        if stated.gauge_length_mm is not None:
+            parts.append(f"length {stated.gauge_length_mm:g} mm")
+        if stated.area_mm2 is not None:
+            parts.append(f"cross-section {stated.area_mm2:g} mm²")
         self.take_told.setText(f"Use what the file says: {', '.join(parts)}")
         self.form.setRowVisible(self.names_line, text)
         self.show_kind(self._kind, self._there)
@@ -182,9 +182,12 @@ class ImportFields(QWidget):
         )
 
     @Slot()
-    def _take_told(self) -> None:
-        told = self._told
-        for key, value in (("gauge_length_mm", told.gauge_length_mm), ("area_mm2", told.area_mm2)):
+    def _take_stated(self) -> None:
+        stated = self._stated
+        for key, value in (
+            ("gauge_length_mm", stated.gauge_length_mm),
+            ("area_mm2", stated.area_mm2),
+        ):
             if value is not None:
                 self._lines[key].setText(f"{value:g}")
         self.changed.emit()

@@ -74,7 +74,7 @@ class Imports(QObject):
 
     @Slot(Path, object)
     def _say(self, out: Path, said: Imported) -> None:
-        text = f"Imported {out.name}: {'; '.join(said.took)}"
-        if said.doubts:
-            text += f". Check: {'; '.join(map(with_labels, said.doubts))}"
-        self.said.emit(text, "warn" if said.doubts else "good")
+        text = f"Imported {out.name}: {'; '.join(said.columns)}"
+        if said.warnings:
+            text += f". Check: {'; '.join(map(with_labels, said.warnings))}"
+        self.said.emit(text, "warn" if said.warnings else "good")

@@ -145,6 +145,6 @@ def _done(connection: Connection, request: Request, lost: threading.Event) -> Wo
 
 def broken(number: int, error: Exception) -> WorkerMessage:
     """Return the response for an error in the program; the window logs its traceback."""
-    words = f"an error in the program ended this work ({type(error).__name__}: {error})"
+    text = f"an error in the program ended this work ({type(error).__name__}: {error})"
     trace = "".join(traceback.format_exception(error))
-    return WorkerMessage(number, "broken", (words, trace))
+    return WorkerMessage(number, "broken", (text, trace))

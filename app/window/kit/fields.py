@@ -23,9 +23,9 @@ from dearig.window.kit.number_text import NumberTextError, read_number, read_num
 __all__ = [
     "FormField",
     "Typed",
+    "as_labelled",
     "form_field",
     "form_fields",
-    "in_words",
     "read_back",
     "read_typed",
     "shown_value",
@@ -53,7 +53,7 @@ class FormField:
     def tip(self) -> str:
         """Name, description, unit and allowed values, for a tooltip."""
         unit = f", in {self.unit}" if self.unit else ""
-        return f"{self.label}: {in_words(self.description)}{unit} ({self.allowed})"
+        return f"{self.label}: {as_labelled(self.description)}{unit} ({self.allowed})"
 
 
 def form_fields(table: type[BaseModel], leave_out: tuple[str, ...] = ()) -> Iterator[FormField]:
@@ -150,7 +150,7 @@ def _keys() -> re.Pattern[str]:
     return re.compile(rf"\b(?:({'|'.join(SECTIONS)})\.)?({named})\b(?!\.)")
 
 
-def in_words(text: str) -> str:
+def as_labelled(text: str) -> str:
     """Return ``text`` with keys of files as the fields are labelled.
 
     ``limits.voltage_max_kV`` becomes limits: voltage max (kV).

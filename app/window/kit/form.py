@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal, Slot
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QLineEdit, QWidget
 
-from dearig.window.kit.fields import FormField, in_words, read_back, read_typed, shown_value
+from dearig.window.kit.fields import FormField, as_labelled, read_back, read_typed, shown_value
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, label, set_wrong
 
@@ -58,7 +58,7 @@ class Form(QWidget):
             grid.addWidget(widget, row, 1)
             grid.addWidget(label(field.unit, "muted"), row, 2)
             if explain:
-                about = label(in_words(field.description), "muted", field.tip)
+                about = label(as_labelled(field.description), "muted", field.tip)
                 about.setWordWrap(True)
                 about.setMinimumWidth(1)  # not that of its longest word
                 self._about.append(about)

@@ -17,7 +17,7 @@ from PySide6.QtCore import QPoint, QPointF, QTimer, Signal, Slot
 from PySide6.QtGui import QGuiApplication, QImage
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.window.documents.dialogs import save_as
 from dearig.window.plots import export as plot_export
 from dearig.window.plots.canvas import GAP, Canvas, Drag
@@ -497,7 +497,7 @@ class PlotArea(QWidget):
         try:
             path.write_bytes(content)
         except OSError as error:
-            self._session.message.emit(f"{path} cannot be written: {in_words(error)}")
+            self._session.message.emit(f"{path} cannot be written: {system_text(error)}")
         else:
             self._session.message.emit(f"Saved as {path}")
 

@@ -29,11 +29,11 @@ def area_text(loops: Loops, squared: bool) -> str:
     unit = f"kV{_SQUARED}\N{DOT OPERATOR}mm" if squared else "kV\N{DOT OPERATOR}mm"
     scale = 1e-6 * 1e3 if squared else 1e-3 * 1e3
     areas = [scale * (c.area_squared if squared else c.area) for c in loops.cycles]
-    words = f"area {significant(scale * loops.mean_area(squared))} {unit} per cycle"
+    text = f"area {significant(scale * loops.mean_area(squared))} {unit} per cycle"
     if len(areas) > 1:
         low, high = significant(min(areas)), significant(max(areas))
-        words += f" ({len(areas)} cycles, {low} to {high})"
-    return words.replace("-", "\N{MINUS SIGN}")
+        text += f" ({len(areas)} cycles, {low} to {high})"
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 class LoopPlot(QWidget):

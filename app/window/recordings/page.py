@@ -570,18 +570,18 @@ class RecordingsPage(Page):
 
     def _show_count(self) -> None:
         shown, total = self.files.rowCount(), len(self._library.files)
-        words = "no recordings yet"
+        text = "no recordings yet"
         if total:
-            words = f"{total} recording{'' if total == 1 else 's'}"
+            text = f"{total} recording{'' if total == 1 else 's'}"
             if self.filter.text().strip():
-                words = f"{shown} of {words}"
+                text = f"{shown} of {text}"
             if self._library.left:
-                words += f", {self._library.left} to read"
+                text += f", {self._library.left} to read"
             selected = len(self.chosen())
             if selected > _TOGETHER_MAX:
-                words += f", {selected} selected ({_TOGETHER_MAX} are plotted)"
-            words += ", reading curves …" * any(p not in self._read for p in self._wanted)
-        self.count.show_text(words)
+                text += f", {selected} selected ({_TOGETHER_MAX} are plotted)"
+            text += ", reading curves …" * any(p not in self._read for p in self._wanted)
+        self.count.show_text(text)
 
     @Slot(int)
     def _view_changed(self, _: int) -> None:

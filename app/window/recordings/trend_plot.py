@@ -119,10 +119,10 @@ class TrendPlot(QWidget):
                 self._found.append((started, value, summary))
         self._found.sort(key=lambda row: row[0])
         count = len(self._found)
-        words = f"{count} run{'' if count == 1 else 's'}"
+        text = f"{count} run{'' if count == 1 else 's'}"
         if without:
-            words += f"; {without} without this number, or not read yet"
-        self.words.show_text(f"{words}. Click a point to select its recording")
+            text += f"; {without} without this number, or not read yet"
+        self.words.show_text(f"{text}. Click a point to select its recording")
         self.area.file_stem = f"trend of {self.quantity.currentText()}"
         self._draw()
         self.area.auto_range()

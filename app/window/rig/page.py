@@ -34,7 +34,7 @@ from dearig.errors import InputError
 from dearig.units import readable
 from dearig.window.documents.file_actions import FileActions
 from dearig.window.jobs.background import Background
-from dearig.window.kit.fields import form_fields, in_words
+from dearig.window.kit.fields import as_labelled, form_fields
 from dearig.window.kit.flow import Flow
 from dearig.window.kit.form import Form
 from dearig.window.kit.number_box import WholeBox
@@ -247,7 +247,7 @@ class RigPage(Page):
         self._show_faults(faults_of(self.text))
 
     def _show_faults(self, faults: dict[tuple[str, str], str]) -> None:
-        faults = {place: in_words(words) for place, words in faults.items()}
+        faults = {place: as_labelled(words) for place, words in faults.items()}
         said = set()
         for i, table in enumerate(SECTIONS):
             keys = {k: words for (t, k), words in faults.items() if t == table}
@@ -280,7 +280,7 @@ class RigPage(Page):
             self.session.unblock(_BLOCK)
             return
         (table, key), words = next(iter(faults.items()))
-        place = in_words(".".join(filter(None, (table, key))))
+        place = as_labelled(".".join(filter(None, (table, key))))
         named = words if words.startswith(place) else f"{place}: {words}"
         more = f" ({len(faults) - 1} more on the page Rig)" if len(faults) > 1 else ""
         self.session.block(
@@ -322,8 +322,8 @@ class RigPage(Page):
             if finding.advice:
                 found += f"; {finding.advice}"
             for column, text in enumerate((verdict, finding.instrument, finding.item, found)):
-                item = QTableWidgetItem(readable(in_words(text)))
-                item.setToolTip(plain_tip(readable(in_words(finding.sentence))))
+                item = QTableWidgetItem(readable(as_labelled(text)))
+                item.setToolTip(plain_tip(readable(as_labelled(finding.sentence))))
                 item.setFlags(Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled)
                 if column == 0:
                     item.setForeground(QColor(colours[finding.verdict]))

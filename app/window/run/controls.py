@@ -213,13 +213,13 @@ class RunControls(QWidget):
     def show_room(self, newest: tuple[float, RoomReading] | None, seconds: float) -> None:
         """Show the newest reading of the room at ``seconds`` of the run, with its age."""
         celsius = percent = float("nan")
-        words = "Room"
+        text = "Room"
         if newest is not None:
             taken, reading = newest
             celsius, percent = reading.temperature, reading.humidity
             age = max(seconds - taken, 0.0)
-            words = f"Room, {age:.0f} s ago" if reading.known else "Room: no value"
-        self.room_title.setText(words)
+            text = f"Room, {age:.0f} s ago" if reading.known else "Room: no value"
+        self.room_title.setText(text)
         self.numbers["temperature"].show_number(celsius, 1)
         self.numbers["humidity"].show_number(percent, 1)
 

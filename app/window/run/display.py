@@ -17,7 +17,7 @@ from dearig.window.run.channel_plots import ChannelPlots
 from dearig.window.run.live import Live, LiveEvent
 from dearig.window.run.live_analysis import LiveAnalysis
 from dearig.window.run.marks import MarkBar
-from dearig.window.run.pace import Pace
+from dearig.window.run.pace import ShownTime
 from dearig.window.run.plots import RunPlots
 from dearig.window.run.view import RunView
 from dearig.window.session.layout_state import remember
@@ -48,7 +48,7 @@ class RunDisplay(QWidget):
         super().__init__(parent)
         self._session = session
         self._clock = clock
-        self._pace = Pace()
+        self._pace = ShownTime()
         self._live: Live | None = None
         self._running = False
         self._marks: list[tuple[str, float, str, str]] = []  # of the run: key, time, words, level
@@ -100,7 +100,7 @@ class RunDisplay(QWidget):
     def begin(self, live: Live, preview: Preview | None, name: str, marks: RunMarks | None) -> None:
         """Show the run of ``live`` from its start; without ``marks``, none can be set in it."""
         self._live, self._running, self._drawn = live, True, _NOTHING
-        self._pace = Pace()
+        self._pace = ShownTime()
         self._marks.clear()
         self._run_channels = self._session.rig_file.channel
         self.view.begin(name)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["Pace"]
+__all__ = ["ShownTime"]
 
 #: Blocks by which the screen may be late before it jumps: a run that is faster than real time, or
 #: a window that was busy.
 _LATE = 2.0
 
 
-class Pace:
+class ShownTime:
     """The time up to which a run is shown, at the speed of a clock and one block behind the run.
 
     So each frame of the screen shows something new: with blocks of 0.1 s there would be ten of them

@@ -213,10 +213,10 @@ class RunPage(Page):
             self.watchdog.show_text("")
             return
         card = session.rig_file.card
-        words = watchdog_text(card, simulated=None)
+        text = watchdog_text(card, simulated=None)
         if not (card.watchdog_s or card.i_have_no_watchdog):
-            words += "; a run on a real card needs card.i_have_no_watchdog = true in the rig file"
-        self.watchdog.show_text(f"Hardware watchdog: {words}", "" if card.watchdog_s else "warn")
+            text += "; a run on a real card needs card.i_have_no_watchdog = true in the rig file"
+        self.watchdog.show_text(f"Hardware watchdog: {text}", "" if card.watchdog_s else "warn")
 
     def _describe_hold(self) -> None:
         """Show the newest answer of the hold that plays or has played, else what is planned."""

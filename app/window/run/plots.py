@@ -205,8 +205,8 @@ class RunPlots(QWidget):
         """Name the curves that are drawn; those without a name are not in the keys."""
         planned = self._planned_shown
         for name, curve in self._planned.items():
-            words = "planned" if name == "voltage" else "predicted"
-            curve.title = words if planned else ""
+            text = "planned" if name == "voltage" else "predicted"
+            curve.title = text if planned else ""
             curve.setVisible(planned)  # hidden ones cost nothing in a frame
         for signal, curve in self._curves.items():
             curve.title = self._words(signal) if self._run_shown else ""

@@ -42,9 +42,9 @@ def planned_text(preview: Preview | None) -> str:
     known = volts[np.isfinite(volts)]
     peak = float(known[np.argmax(np.abs(known))]) * 1e-3 if known.size else 0.0
     # + 0.0 turns a negative zero, which a small negative value is rounded to, into zero
-    words = f"Planned: {preview.loaded.sequence.name}, peak {round(peak, 2) + 0.0:.2f} kV, "
-    words += f"{preview.plan.duration:.1f} s"
-    return words if preview.playable else f"{words} (refused by the limits)"
+    text = f"Planned: {preview.loaded.sequence.name}, peak {round(peak, 2) + 0.0:.2f} kV, "
+    text += f"{preview.plan.duration:.1f} s"
+    return text if preview.playable else f"{text} (refused by the limits)"
 
 
 class RunView(QWidget):

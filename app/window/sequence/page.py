@@ -14,7 +14,7 @@ from dearig.window.documents.dialogs import choose_file
 from dearig.window.documents.draft import Draft, relative_csv
 from dearig.window.documents.file_actions import FileActions
 from dearig.window.documents.segment_editor import SequenceEditor
-from dearig.window.kit.fields import in_words
+from dearig.window.kit.fields import as_labelled
 from dearig.window.kit.flow import Flow
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import button, menu_button
@@ -207,7 +207,7 @@ class SequencePage(Page):
             *(preview.plan.reasons if preview.plan else ()),
         ]
         more = f" ({len(said) - 1} more on the page Sequence)" if len(said) > 1 else ""
-        self.session.block(_BLOCK, f"sequence: {in_words(said[0])}{more}", self.title)
+        self.session.block(_BLOCK, f"sequence: {as_labelled(said[0])}{more}", self.title)
 
     @Slot()
     def _highlight(self) -> None:

@@ -17,7 +17,7 @@ from dearig.errors import InputError, Interrupted
 from dearig.progress import Progress, quiet
 from dearig.window.jobs.background import Background
 from dearig.window.jobs.worker import Worker
-from dearig.window.kit.fields import in_words
+from dearig.window.kit.fields import as_labelled
 from dearig.window.run.traces import Pyramid
 from dearig.window.sequence.limit_marks import RowPeaks, fields_beyond, rows_beyond
 from dearig.window.sequence.outline import outline
@@ -200,7 +200,7 @@ def make_preview(
 
 def _refused(toml: str, loaded: LoadedSequence | None, faults: list[SequenceFault]) -> Preview:
     """Return the preview of a sequence that cannot be planned."""
-    many = [in_words(fault.sentence) for fault in faults]
+    many = [as_labelled(fault.sentence) for fault in faults]
     rest = f" (and {len(many) - 1} more)" if len(many) > 1 else ""
     return Preview(toml, loaded, sentence=many[0] + rest, faults=tuple(faults))
 

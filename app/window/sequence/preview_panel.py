@@ -6,7 +6,7 @@ from PySide6.QtCore import QTimer, Slot
 from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QVBoxLayout, QWidget
 
 from dearig.drivers.gate import Margin
-from dearig.window.kit.fields import in_words
+from dearig.window.kit.fields import as_labelled
 from dearig.window.kit.theme import SPACE
 from dearig.window.kit.widgets import Message, card, label
 from dearig.window.sequence.preview_plots import PreviewPlots
@@ -78,7 +78,7 @@ class PreviewPanel(QWidget):
         self._show_margins(() if waveform is None else waveform.margins)
 
     def _show_faults(self, head: str, sentences: list[str]) -> None:
-        lines = [f"✗ {in_words(sentence)}" for sentence in sentences[:_FAULTS_MAX]]
+        lines = [f"✗ {as_labelled(sentence)}" for sentence in sentences[:_FAULTS_MAX]]
         if len(sentences) > _FAULTS_MAX:
             lines.append(f"and {len(sentences) - _FAULTS_MAX} more, marked in the table")
         self.state.show_text("\n".join(filter(None, [head, *lines])), "bad")

@@ -67,16 +67,16 @@ class PreviewPlots(PlotArea):
         for name, curve in self._curves.items():
             x, y = curves.get(name, (np.empty(0), np.empty(0)))
             curve.set_points(x, y * _PLOTS[name][1])
-            words = ""
+            text = ""
             if preview is not None and not planned:
-                words = "no prediction: the sequence cannot be played"
+                text = "no prediction: the sequence cannot be played"
             elif planned and not y.size:
-                words = "the prediction follows"
+                text = "the prediction follows"
             elif y.size and not np.isfinite(y).any():
-                words = "no prediction: a limit is already exceeded"
+                text = "no prediction: a limit is already exceeded"
             elif not np.isfinite(y).all():
-                words = "prediction up to where a limit is exceeded or the model fails"
-            self._plots[name].set_note(words)
+                text = "prediction up to where a limit is exceeded or the model fails"
+            self._plots[name].set_note(text)
         self._mark()
         if preview is None or not planned:
             return

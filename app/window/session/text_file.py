@@ -10,7 +10,7 @@ from typing import Any
 from dearig.config.toml_input import parse_toml, read_text
 from dearig.errors import InputError
 from dearig.recording.files import write_whole
-from dearig.window.kit.fields import in_words
+from dearig.window.kit.fields import as_labelled
 from dearig.window.kit.widgets import plain_tip
 
 __all__ = ["EditedFile", "OverwriteQuestion", "Saved"]
@@ -55,7 +55,7 @@ class EditedFile:
         parts = list(dict.fromkeys(_differences(before, after))) or ["comments"]
         more = len(parts) - _PARTS_MAX
         listed = ", ".join(parts[:_PARTS_MAX]) + (f" and {more} more" if more > 0 else "")
-        return f"{name} (changed: {in_words(listed)})"
+        return f"{name} (changed: {as_labelled(listed)})"
 
     def write(self, path: Path, text: str, replace: bool) -> Saved | OverwriteQuestion:
         """Write ``text`` to ``path`` as a whole; raises ``InputError`` where that is not possible.

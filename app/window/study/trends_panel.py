@@ -251,9 +251,9 @@ class TrendsPanel(QWidget):
             size=_SIZE,
         ).set_points(x[~marked], y[~marked])  # fmt: skip
         if marked.any():
-            words = "films with an effect of their own" if chosen is None else f"runs of {chosen}"
+            text = "films with an effect of their own" if chosen is None else f"runs of {chosen}"
             self.plot.add_curve(
-                words, theme.warn, symbol="t", line=False, size=_SIZE + 2
+                text, theme.warn, symbol="t", line=False, size=_SIZE + 2
             ).set_points(x[marked], y[marked])
 
 

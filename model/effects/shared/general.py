@@ -15,7 +15,7 @@ import numpy as np
 from dearig.model.effects.description import Curve, Effect, Law, Parameter
 from dearig.model.effects.shared.splines import SOURCE, step
 
-__all__ = ["Axis", "Elements", "Relaxations", "Shapes", "Steps", "Weights", "general"]
+__all__ = ["Axis", "Elements", "Relaxations", "Shapes", "SmoothSteps", "Weights", "general"]
 
 _POINTS = 60  # of a curve
 
@@ -43,7 +43,7 @@ class Shapes(Protocol):
 
 
 @dataclass(frozen=True)
-class Steps:
+class SmoothSteps:
     """Smooth steps; the hat of step i lies on the knots i, i + 1 and i + 2 (``splines``)."""
 
     knots: tuple[float, ...]

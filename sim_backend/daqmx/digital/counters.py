@@ -15,7 +15,7 @@ from dearig.sim_backend.daqmx.card.terminals import Terminals
 from dearig.sim_backend.daqmx.card.triggers import AwaitedEdge, Edge, Pause, SampleTicks
 from dearig.sim_backend.daqmx.card.work import CardSamples, SampledInput
 from dearig.sim_backend.daqmx.digital.counting import Counting
-from dearig.sim_backend.daqmx.digital.intervals import Intervals
+from dearig.sim_backend.daqmx.digital.intervals import EdgeIntervals
 from dearig.sim_backend.daqmx.digital.measures import (
     ENCODERS,
     PULSES,
@@ -57,7 +57,7 @@ class CounterInput(SampledInput):
         self._pause = pause
         self._armed = armed
         self._counting = Counting(channel, self._signal)
-        self._intervals = Intervals(channel, self._signal)
+        self._intervals = EdgeIntervals(channel, self._signal)
         self._ready: list[np.ndarray] = []  # values that the buffer has not
         self._ends = np.empty(0)
         self._last: np.ndarray | None = None  # the newest value of a task without timing

@@ -12,12 +12,12 @@ from dearig.sim_backend.daqmx.card.numbers import RISING
 from dearig.sim_backend.daqmx.card.signals import Signal
 from dearig.sim_backend.daqmx.digital.measures import PULSES, Measure
 
-__all__ = ["Intervals"]
+__all__ = ["EdgeIntervals"]
 
 _MOST_EDGES = 1 << 20  # edges that are looked at in one step
 
 
-class Intervals:
+class EdgeIntervals:
     """Lengths of time between edges: each complete one, in s, with the time of its end."""
 
     def __init__(self, channel: CounterChannel, signals: Callable[[str], Signal]) -> None:

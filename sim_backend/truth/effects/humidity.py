@@ -149,7 +149,7 @@ def swollen(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa:
 def losing_contact(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
     """Draw electrodes whose resistance grows with the humidity of the air."""
     resistance, power = log_uniform(generator, *_RESISTANCE), log_uniform(generator, *_POWER)
-    words = f"electrodes of {resistance / 1e6:.3g} Mohm at 50 %, growing with the power {power:.2g}"
+    text = f"electrodes of {resistance / 1e6:.3g} Mohm at 50 %, growing with the power {power:.2g}"
 
     def charging(air: Air) -> Callable[[FilmNumbers], FilmNumbers]:
         moist = 0.01 * float(air.humidity(np.zeros(1))[0])
@@ -161,9 +161,9 @@ def losing_contact(generator: np.random.Generator, load: Load) -> TruthEffect:  
         return on_film
 
     def in_room(air: Air) -> TruthEffect:
-        return TruthEffect("humidity", "electrode", words, in_room=in_room, on_film=charging(air))
+        return TruthEffect("humidity", "electrode", text, in_room=in_room, on_film=charging(air))
 
-    return TruthEffect("humidity", "electrode", words, in_room=in_room)
+    return TruthEffect("humidity", "electrode", text, in_room=in_room)
 
 
 def conducting(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
@@ -171,7 +171,7 @@ def conducting(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
     series = log_uniform(generator, *_SERIES)
     current = log_uniform(generator, *_LOST) / series
     power, sorption = log_uniform(generator, *_CONDUCTING), log_uniform(generator, *_SORPTION)
-    words = (
+    text = (
         f"leakage of {current * 1e6:.3g} uA at 8 kV and 50 % behind {series / 1e6:.3g} Mohm, "
         f"growing with the power {power:.2g} of the moisture, which follows in {sorption:.3g} s"
     )
@@ -187,6 +187,6 @@ def conducting(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
         return on_film
 
     def in_room(air: Air) -> TruthEffect:
-        return TruthEffect("humidity", "electrode", words, in_room=in_room, on_film=leaking(air))
+        return TruthEffect("humidity", "electrode", text, in_room=in_room, on_film=leaking(air))
 
-    return TruthEffect("humidity", "electrode", words, in_room=in_room)
+    return TruthEffect("humidity", "electrode", text, in_room=in_room)

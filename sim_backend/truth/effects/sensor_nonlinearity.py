@@ -63,8 +63,8 @@ def ripple(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: 
             1.0 + size * wave * np.cos(angle),
         )
 
-    words = f"the reading has a periodic error of {size * 1e6:.3g} um with a period of "
-    return _bent(curve, words + f"{2e3 * math.pi / wave:.2g} mm")
+    text = f"the reading has a periodic error of {size * 1e6:.3g} um with a period of "
+    return _bent(curve, text + f"{2e3 * math.pi / wave:.2g} mm")
 
 
 def soft_clip(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
@@ -77,5 +77,5 @@ def soft_clip(generator: np.random.Generator, load: Load) -> TruthEffect:  # noq
         beyond = np.maximum(x - corner, 0.0)
         return x - beyond + beyond / (1.0 + beyond / scale), 1.0 / (1.0 + beyond / scale) ** 2
 
-    words = f"beyond {corner * 1e3:.2g} mm the reading is too small, "
-    return _bent(curve, words + f"by {lost * 1e6:.3g} um after another mm")
+    text = f"beyond {corner * 1e3:.2g} mm the reading is too small, "
+    return _bent(curve, text + f"by {lost * 1e6:.3g} um after another mm")

@@ -84,7 +84,7 @@ def room(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: AR
 def weathered(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
     """Draw moduli exp(E/R (1/T - 1/T_0)) that follow the temperature of the room."""
     kelvin = log_uniform(generator, *_ACTIVATION)
-    words = f"moduli fall by {kelvin / _REFERENCE**2:.2%}/K about 23 degC"
+    text = f"moduli fall by {kelvin / _REFERENCE**2:.2%}/K about 23 degC"
 
     def stiffness(celsius: np.ndarray) -> np.ndarray:
         return np.exp(kelvin * (1.0 / (celsius + _KELVIN) - 1.0 / _REFERENCE))
@@ -97,8 +97,8 @@ def weathered(generator: np.random.Generator, load: Load) -> TruthEffect:  # noq
             return rows
 
         return TruthEffect(
-            "thermal", "environment", words, in_room=in_room,
+            "thermal", "environment", text, in_room=in_room,
             on_film=lambda numbers: numbers.stiffened(start), on_course=on_course,
         )  # fmt: skip
 
-    return TruthEffect("thermal", "environment", words, in_room=in_room)
+    return TruthEffect("thermal", "environment", text, in_room=in_room)

@@ -109,11 +109,11 @@ def legendre(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa
         seen = rows[0] + error(x) - at_rest
         return np.stack((seen, rows[1] * (1.0 + np.where(inside, slope(x), 0.0)))), carry
 
-    words = ", ".join(f"{size * 1e6:.2g}" for size in sizes)
+    text = ", ".join(f"{size * 1e6:.2g}" for size in sizes)
     return TruthEffect(
         family="sensor_nonlinearity",
         acts_on="sensor",
-        description=f"the reading has errors of third to fifth order of {words} um",
+        description=f"the reading has errors of third to fifth order of {text} um",
         on_motion=on_motion,
     )
 

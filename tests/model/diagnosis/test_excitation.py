@@ -11,7 +11,7 @@ from dearig.config.sequencefile import load_sequence
 from dearig.model.diagnosis.excitation import (
     BANDS,
     LEVELS,
-    Motion,
+    PredictedRun,
     excitation,
     range_of,
     shown_by,
@@ -30,12 +30,12 @@ DAMPED = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, (("linear drag", (("drag", 
 
 
 @functools.cache
-def motion(sequence: str, model: Actuator = FILM, scale: float = 1.0) -> Motion:
+def motion(sequence: str, model: Actuator = FILM, scale: float = 1.0) -> PredictedRun:
     """What ``model`` makes of a ``sequence``, its voltage scaled."""
     time, voltage = load_sequence(sequence).sample(1.0 / STEP)
     answer = model.simulate(Drive(time, scale * voltage, hold=True))
-    assert answer.ok, answer.in_words
-    return Motion(sequence, STEP, scale * voltage, answer.displacement, NOISE)
+    assert answer.ok, answer.status_text
+    return PredictedRun(sequence, STEP, scale * voltage, answer.displacement, NOISE)
 
 
 def error(sequence: str, truth: Actuator, seed: int = 0, scale: float = 1.0) -> np.ndarray:
@@ -51,7 +51,7 @@ def rms(values: np.ndarray) -> float:
 def test_a_gain_is_known_to_what_least_squares_leaves_of_it() -> None:
     """Equation (10), against fits of the two components of a gain to many noises."""
     time = np.arange(4000) * STEP
-    shown = Motion(
+    shown = PredictedRun(
         "tone", STEP, np.zeros(4000), 0.2 * NOISE * np.sin(2.0 * np.pi * 30.0 * time), NOISE
     )
     rng = np.random.default_rng(3)
@@ -124,7 +124,7 @@ def test_a_displacement_beyond_that_of_training() -> None:
     far = slow.response > np.max(quick.response) + 2.0 * NOISE
     wrong[far] += 5.0 * NOISE
     # the same voltage, held for longer
-    higher = Motion("quick", STEP, np.full_like(quick.drive, 8e3), quick.response, NOISE)
+    higher = PredictedRun("quick", STEP, np.full_like(quick.drive, 8e3), quick.response, NOISE)
     assert excitation([higher], slow, wrong).cause == LEVELS
     assert excitation([higher, slow], slow, wrong).above == 0.0
 
@@ -171,7 +171,7 @@ def test_what_is_sampled_faster_than_training_is_beyond_it() -> None:
     fast = motion("thesis")
     time = np.arange(4 * fast.response.size) * STEP / 4.0
     tone = 30.0 * NOISE * np.sin(2.0 * np.pi * 150.0 * time)
-    twice = Motion("fast", STEP / 4.0, np.repeat(fast.drive, 4), tone, NOISE)
+    twice = PredictedRun("fast", STEP / 4.0, np.repeat(fast.drive, 4), tone, NOISE)
     beyond = shown.beyond(twice)
     assert beyond is not None
     assert beyond.bands[-1].high == pytest.approx(2.0 / STEP)

@@ -99,7 +99,7 @@ def measured(model):
     """What ``model`` shows on the test's course: displacement in m, or stress in Pa."""
     answer = model.simulate(*pulled()) if isinstance(model, Strip) else None
     answer = answer or model.simulate(COURSE.drive(500.0))
-    assert answer.ok, answer.in_words
+    assert answer.ok, answer.status_text
     return answer.stress if isinstance(model, Strip) else answer.displacement
 
 
@@ -259,7 +259,7 @@ def test_against_the_oracle(name):
     compared = slice(None, None, 5)  # the oracle's states between its steps are dear
     expected = follow(film, COURSE, drive.time[compared], effect)
     found = with_effect(THESIS, name, values).simulate(drive)
-    assert found.ok, found.in_words
+    assert found.ok, found.status_text
     error = np.abs(found.stretch[compared] - expected).max() * LENGTH
     assert error < SPLITTING.get(name, 0.1) * 1e-6
 

@@ -141,7 +141,7 @@ def records(model, seed=0):
     part = 0.5 if all(name in IN_HALF for name, _ in model.effects) else 1.0
     for i, drive in enumerate(courses(part)):
         answer = model.simulate(drive)
-        assert answer.ok, answer.in_words
+        assert answer.ok, answer.status_text
         noisy = answer.displacement + NOISE * rng.standard_normal(drive.time.size)
         made.append(ActuatorRecord(f"record {i}", drive, noisy, NOISE))
     return made

@@ -268,7 +268,7 @@ def test_a_simulation_that_fails_says_why_and_repeats_the_last_stretch(
     time = ticks(2.0, 1e-2)
     response = Actuator(THESIS_FILM, Load(mass), springs).simulate(Drive(time, drive(time)))
     assert response.status == status
-    assert words in response.in_words
+    assert words in response.status_text
     assert np.isfinite(response.displacement).all()
     assert (response.stretch[response.reached :] == response.stretch[-1]).all()
 

@@ -47,7 +47,7 @@ def test_against_scipy(kinematics, relaxation_time):
     stretch = 1.3 + 0.25 * np.sin(0.9 * time)
     network = Network(ELASTIC, (Branch(Spring(80e3, 5.0), relaxation_time),))
     found = Strip(network, kinematics).simulate(time, stretch)
-    assert found.ok, found.in_words
+    assert found.ok, found.status_text
     expected = expected_stress(network, kinematics, time, stretch)
     assert np.abs(found.stress - expected).max() < 1.0  # Pa of some 50 kPa
 

@@ -13,7 +13,7 @@ from dearig.recording import open_recording
 from dearig.recording.content import bounds
 from dearig.recording.content.bounds import STRETCH, VOLTAGE, Bounds, Range
 from dearig.recording.content.metadata import RunMetadata
-from dearig.recording.importers.columns.plausible import doubts
+from dearig.recording.importers.columns.plausible import plausibility_warnings
 from dearig.recording.writing.save import save_recording
 
 TIME = np.arange(400) / 50.0
@@ -61,7 +61,7 @@ def test_a_fit_refuses_from_the_bound_on_and_an_import_asks_before(
         (possible * outside, True, True),
     ):
         found = values(size)
-        said = [text for text in doubts(found, None) if text.startswith(name)]
+        said = [text for text in plausibility_warnings(found, None) if text.startswith(name)]
         assert bool(said) is asks
         said = refusal(tmp_path / "run.h5", found)
         assert (f"the {name} " in said) is bool(said) is refuses

@@ -295,15 +295,15 @@ def test_what_looks_wrong_is_told(
         csv(tmp_path, content), out, ImportOptions(**given), metadata=metadata, now=Clock()
     )
     run = open_recording(out)
-    assert [e.message for e in run.events] == [*done.notes, *done.doubts]
-    assert any(re.search(match, w) for w in done.doubts), done
+    assert [e.message for e in run.events] == [*done.notes, *done.warnings]
+    assert any(re.search(match, w) for w in done.warnings), done
 
 
 def test_good_data_raise_no_doubts(tmp_path: Path) -> None:
     path = csv(tmp_path, lead_in(0.0))
     metadata = RunMetadata(film=THESIS_FILM)
     done = import_file(path, tmp_path / "out.h5", metadata=metadata, now=Clock())
-    assert done.doubts == ()
+    assert done.warnings == ()
 
 
 @pytest.mark.parametrize("volts", [4000.0, -4000.0])
@@ -315,7 +315,7 @@ def test_a_displacement_with_the_other_sign_raises_a_doubt(tmp_path: Path, volts
         rows = np.column_stack([0.01 * np.arange(1500), volts * lobes, sign * 1e-4 * lobes + noise])
         path = tmp_path / "in.csv"
         np.savetxt(path, rows, delimiter=",", comments="", header="time_s,voltage_V,displacement_m")
-        found = import_file(path, tmp_path / f"{sign:g}.h5", now=Clock()).doubts
+        found = import_file(path, tmp_path / f"{sign:g}.h5", now=Clock()).warnings
         said = [s for s in found if "falls where the voltage rises: is its sign right?" in s]
         assert bool(said) is doubtful
 
@@ -327,7 +327,7 @@ def test_noise_alone_raises_no_doubt_about_its_sign(tmp_path: Path) -> None:
         rows = np.column_stack([0.01 * np.arange(1500), 4000.0 * lobes, noise])
         path = tmp_path / "in.csv"
         np.savetxt(path, rows, delimiter=",", comments="", header="time_s,voltage_V,displacement_m")
-        found = import_file(path, tmp_path / f"{seed}.h5", now=Clock()).doubts
+        found = import_file(path, tmp_path / f"{seed}.h5", now=Clock()).warnings
         assert not any("sign" in sentence for sentence in found)
 
 
@@ -453,7 +453,7 @@ def test_measured_csv(tmp_path: Path, name: str, rows: int, highest: float) -> N
     source = measured_data() / name
     out = tmp_path / "out.h5"
     options = ImportOptions(gauge_length_mm=80, area_mm2=22)
-    assert import_file(source, out, options, now=Clock()).doubts == ()
+    assert import_file(source, out, options, now=Clock()).warnings == ()
     run = open_recording(out)
     raw = np.loadtxt(source, delimiter=",", skiprows=1)
     assert run.samples == rows == len(raw)
@@ -472,7 +472,7 @@ def test_measured_mat(tmp_path: Path) -> None:
         "nominal_stress_kPa": "data.ydata",
     }
     out = tmp_path / "out.h5"
-    assert import_file(source, out, ImportOptions(columns), now=Clock()).doubts == ()
+    assert import_file(source, out, ImportOptions(columns), now=Clock()).warnings == ()
     run = open_recording(out)
     data = loadmat(source)["data"][0, 0]
     np.testing.assert_array_equal(run.time, data["xdata"][:, 0])

@@ -154,7 +154,7 @@ def test_a_unit_that_is_not_known_needs_a_scale(tmp_path: Path) -> None:
         imported(tmp_path, text, columns=given)
     done, run = imported(tmp_path, text, columns={"displacement_mm": "Travel (px)*1"})
     same(run)
-    assert "displacement in mm from 'Travel (px)', scaled *1" in done.took
+    assert "displacement in mm from 'Travel (px)', scaled *1" in done.columns
     assert label_of("Travel (measured)").unknown == ""
 
 

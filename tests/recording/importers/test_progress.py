@@ -152,7 +152,7 @@ def test_a_scale_that_overrules_the_unit_of_a_name_is_said(tmp_path: Path) -> No
     path = csv(tmp_path)
     out = tmp_path / "out.h5"
     said = import_file(path, out, ImportOptions(columns={"displacement_mm": "displacement_mm*-2"}))
-    assert "displacement in mm from 'displacement_mm', scaled *-2" in said.took
+    assert "displacement in mm from 'displacement_mm', scaled *-2" in said.columns
     assert any("although its name says mm" in note for note in said.notes)
     assert any("its sign right" in doubt for doubt in said.doubts)
     np.testing.assert_allclose(open_recording(out).displacement, -2.0 * MOVED, rtol=1e-9, atol=1e-9)

@@ -15,7 +15,7 @@ from openpyxl import Workbook
 from pyarrow import parquet
 from scipy.io import savemat
 
-from dearig.recording.importers.formats.excel_file import Shown, shown_by
+from dearig.recording.importers.formats.excel_file import NumberFormat, shown_by
 from dearig.recording.importers.formats.stored import stated_scale
 from dearig.recording.importers.quantities.labels import label_of
 from tests.tools.imports import MOVED, NAMES, ROWS, TIME, VOLTAGE, refused, same, taken
@@ -232,7 +232,7 @@ def test_numbers_too_large_for_an_instrument_are_no_readings(tmp_path: Path, pla
      ("#,##0.00", 1.0, ""), ("General", 1.0, ""), ('0.0" x"', 1.0, "")],
 )  # fmt: skip
 def test_what_a_format_of_cells_shows(number_format: str, times: float, unit: str) -> None:
-    assert shown_by(number_format) == Shown(times, unit)
+    assert shown_by(number_format) == NumberFormat(times, unit)
 
 
 def test_a_strain_that_a_workbook_shows_in_per_cent(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from dearig.model.readings.environment import CELSIUS, HUMIDITY
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.model.simulation.excitation import Sequence
-from dearig.sim_backend.room import Air, still_air
+from dearig.sim_backend.room import AirOfRoom, still_air
 from dearig.sim_backend.truth.cases import ROOM_FORMS, draw
 from dearig.sim_backend.truth.effects import humidity, thermal
 from dearig.sim_backend.truth.film import FilmNumbers
@@ -90,7 +90,7 @@ def test_a_film_remembers_the_room_of_the_hours_before() -> None:
     rests = []
     # 45 % on the way up from 30 %, and on the way down from 60 %
     for start in (720.0, 1920.0):
-        air = Air(cycling, start)
+        air = AirOfRoom(cycling, start)
         assert float(air.humidity(np.zeros(1))[0]) == pytest.approx(45.0)
         rests.append(TruthPlant.at_rest(NUMBERS, (effect,)).in_room(air).rest)
     still = TruthPlant.at_rest(NUMBERS, (effect,)).in_room(still_air(22.0, 45.0)).rest
@@ -99,7 +99,7 @@ def test_a_film_remembers_the_room_of_the_hours_before() -> None:
 
 def test_a_run_does_not_depend_on_its_pieces() -> None:
     effect = humidity.swollen(np.random.default_rng(3), THESIS_LOAD)
-    air = Air(RoomSettings(heating_percent=30.0, heating_period_min=1.0))
+    air = AirOfRoom(RoomSettings(heating_percent=30.0, heating_period_min=1.0))
     time, voltage = Sequence.thesis(periods=1).sample(RATE)
     whole, _ = TruthPlant.at_rest(NUMBERS, (effect,)).in_room(air).advance(time, voltage, False)
     plant, joined = TruthPlant.at_rest(NUMBERS, (effect,)).in_room(air), np.zeros(time.size)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dearig.window.run.pace import Pace
+from dearig.window.run.pace import ShownTime
 
 FRAME, BLOCK = 1.0 / 60.0, 0.1
 
 
 def test_each_frame_between_blocks_shows_something_new_and_nothing_that_is_not_there() -> None:
-    pace, shown = Pace(), []
+    pace, shown = ShownTime(), []
     for frame in range(600):
         now = frame * FRAME
         end = BLOCK * np.floor(now / BLOCK)
@@ -25,14 +25,14 @@ def test_each_frame_between_blocks_shows_something_new_and_nothing_that_is_not_t
 
 
 def test_a_run_that_is_faster_than_real_time_is_followed_within_two_blocks() -> None:
-    pace = Pace()
+    pace = ShownTime()
     for frame in range(1, 100):
         end = frame * 3.0  # s of the run in a frame
         assert end - pace.shown(end, frame * FRAME) <= 2.0 * 3.0
 
 
 def test_what_does_not_come_is_not_passed_and_another_run_begins_anew() -> None:
-    pace = Pace()
+    pace = ShownTime()
     pace.shown(0.5, 0.0)
     assert pace.shown(0.5, 10.0) == 0.5
     assert pace.shown(0.6, 20.0) == pytest.approx(0.6)

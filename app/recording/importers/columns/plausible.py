@@ -16,7 +16,7 @@ from dearig.recording.content.bounds import (
     VOLTAGE,
 )
 
-__all__ = ["doubts"]
+__all__ = ["plausibility_warnings"]
 
 #: Correlation of displacement and squared voltage beyond which the sign is sure. It is 0.7 to 1 for
 #: films with creep, friction or drift under sines, lobes and chirps, and near 0 for noise alone.
@@ -51,7 +51,7 @@ def _shared_sign(voltage: np.ndarray, displacement: np.ndarray) -> float:
     return float(pull @ moved) / size if size > 0.0 else 0.0
 
 
-def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
+def plausibility_warnings(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
     """Return a sentence for each of ``values`` (in the recording's units) that is doubtful."""
     found = []
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 
 from dearig.recording.importers.source import Source
 
-__all__ = ["Start", "start_of"]
+__all__ = ["MeasurementStart", "start_of"]
 
 #: Epochs from which programs count seconds, and days (as spreadsheets do, on the wall's clock).
 _UNIX = datetime(1970, 1, 1, tzinfo=UTC)
@@ -20,14 +20,14 @@ _DAY = 86_400.0  # s
 
 
 @dataclass(frozen=True)
-class Start:
+class MeasurementStart:
     """Start of a measurement in s since 1970, and what tells it, as "the column 'Date'"."""
 
     at: float
-    told_by: str
+    stated_by: str
 
 
-def start_of(source: Source, column: str | None, first: float) -> Start | None:
+def start_of(source: Source, column: str | None, first: float) -> MeasurementStart | None:
     """Return the start of the measurement, or None where ``source`` does not tell it.
 
     ``column`` has the time, None where no column has it; ``first`` is its first value in s. A date
@@ -54,8 +54,8 @@ def _epoch_of(first: float) -> datetime | None:
     return None
 
 
-def _start(began: datetime, seconds: float, told_by: str) -> Start | None:
+def _start(began: datetime, seconds: float, stated_by: str) -> MeasurementStart | None:
     try:
-        return Start((began + timedelta(seconds=seconds)).timestamp(), told_by)
+        return MeasurementStart((began + timedelta(seconds=seconds)).timestamp(), stated_by)
     except (OverflowError, OSError, ValueError):  # a year that this system cannot convert
         return None

@@ -24,17 +24,17 @@ _SOME = 2**17
 def one_clock(
     time: np.ndarray, place: Callable[[int], str]
 ) -> tuple[np.ndarray, list[str], list[str]]:
-    """Return the times (n,) of a clock in s as one that goes forward, notes, and doubts.
+    """Return the times (n,) of a clock in s as one that goes forward, notes, and warnings.
 
     ``place`` says where a row is in the file. A time of day that falls by more than half a day is
     of the next day. A clock that falls by an hour was set back at the end of summer time.
     """
     notes: list[str] = []
-    doubts: list[str] = []
+    warnings: list[str] = []
     steps = np.diff(time)
     forward = steps[steps > 0.0]
     if not forward.size or not np.isfinite(steps).all():
-        return time, notes, doubts
+        return time, notes, warnings
     usual = float(np.median(forward))
     added = np.zeros(time.size)
     for at in np.flatnonzero(steps < 0.0).tolist():
@@ -43,11 +43,11 @@ def one_clock(
             notes.append(f"after {place(at)} the time of day begins again: the next day")
         elif abs(steps[at] + _SUMMER - usual) <= max(usual, 1.0):
             added[at + 1 :] += _SUMMER
-            doubts.append(
+            warnings.append(
                 f"the time goes back by {-steps[at]:g} s after {place(at)}: did summer time end? "
                 f"An hour was added to what follows"
             )
-    return (time + added if notes or added.any() else time), notes, doubts
+    return (time + added if notes or added.any() else time), notes, warnings
 
 
 def jumps(time: np.ndarray, place: Callable[[int], str]) -> list[str]:

@@ -14,7 +14,7 @@ from dearig.recording.importers.columns.chosen import Chosen, Pick
 from dearig.recording.importers.columns.guess import LENGTHS, PULLS
 from dearig.recording.importers.columns.markers import markers_in
 from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
-from dearig.recording.importers.columns.start import Start, start_of
+from dearig.recording.importers.columns.start import MeasurementStart, start_of
 from dearig.recording.importers.columns.time_faults import (
     check_forward,
     forward_rows,
@@ -55,8 +55,9 @@ class Values:
     """Values (n,) of a recording of some ``kind``, by their names in it.
 
     ``left`` are the places of rows that were left out, by the sample before which they stood.
-    ``warnings`` are doubts and ``notes`` what was done to the values. ``start`` is the start of the
-    measurement, where the file tells it. ``channels`` has unit and label of declared channels.
+    ``warnings`` are what should be checked and ``notes`` what was done to the values. ``start`` is
+    the start of the measurement, where the file tells it. ``channels`` has unit and label of
+    declared channels.
     """
 
     kind: str
@@ -64,7 +65,7 @@ class Values:
     left: dict[int, list[str]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    start: Start | None = None
+    start: MeasurementStart | None = None
     channels: dict[str, tuple[str, str]] = field(default_factory=dict)
 
 
@@ -243,7 +244,7 @@ def _read(
     step = _step(chosen, columns, rate_Hz)
     raw = _read_columns(chosen, picked, values)
     values.notes += getattr(source, "notes", ())
-    values.warnings += getattr(source, "doubts", ())
+    values.warnings += getattr(source, "warnings", ())
     columns = [pick.column for pick in picked.values()]
     sizes = {column: raw[column].size for column in columns}
     size = min(sizes.values())
@@ -273,9 +274,9 @@ def _read(
     )
     good = _unmarked(chosen, table, picked, values)
     if "time" in picked and _is_clock(source, picked["time"].column):
-        table["time"], notes, doubts = one_clock(table["time"], source.row)
+        table["time"], notes, warnings = one_clock(table["time"], source.row)
         values.notes += notes
-        values.warnings += doubts
+        values.warnings += warnings
     good = _good_rows(chosen, table, names, skip, good)
     if not good.all():
         table = {q: column[good] for q, column in table.items()}

@@ -21,10 +21,10 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.input_file import open_input
-from dearig.recording.files import in_words, one_line
+from dearig.recording.files import one_line, system_text
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
 from dearig.recording.importers.formats.columns import unseen
-from dearig.recording.importers.formats.stored import Stored, StoredColumns
+from dearig.recording.importers.formats.stored import StoredColumn, StoredColumns
 from dearig.recording.importers.formats.text_layout import TextColumn, TextLayout, layout_of
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.moments import first_moment
@@ -79,14 +79,14 @@ class ExcelFile(StoredColumns):
                 why.append(str(error))
         if not sheets:
             raise InputError(why[0] if why else f"{path} has no sheet with a table of numbers")
-        columns: dict[str, Stored] = {}
+        columns: dict[str, StoredColumn] = {}
         for sheet in sheets:
             before = f"{printable(sheet.name)}/" if len(sheets) > 1 else ""
             for column in sheet.layout.columns:
                 table = "/".join(filter(None, (before.rstrip("/"), column.group)))
                 lasts = column.place in sheet.durations
-                shown = sheet.shown.get(column.place, Shown())
-                columns[before + printable(column.name)] = Stored(
+                shown = sheet.shown.get(column.place, NumberFormat())
+                columns[before + printable(column.name)] = StoredColumn(
                     _load(sheet, column, shown.times), None, column.own,
                     "s" if lasts else column.unit or shown.unit,
                     "time" if lasts or column.since is not None else "", table,
@@ -105,14 +105,14 @@ def _load(sheet: _Sheet, column: TextColumn, times: float) -> Callable[[], np.nd
 
 
 @dataclass(frozen=True)
-class Shown:
+class NumberFormat:
     """What a number format makes of a number: it shows it ``times`` as large, with a ``unit``."""
 
     times: float = 1.0
     unit: str = ""
 
 
-def shown_by(number_format: str) -> Shown:
+def shown_by(number_format: str) -> NumberFormat:
     """Return what the number format of a cell makes of a number.
 
     ``0.0%`` shows 0.125 as 12.5%, ``0.000,`` 3200 as 3.200, and ``0.0" kV"`` adds a unit.
@@ -124,7 +124,7 @@ def shown_by(number_format: str) -> Shown:
     thousands = _THOUSANDS.search(plain)
     times = 1000.0 ** -len(thousands[1]) if thousands else 1.0
     percent = plain.count("%")
-    return Shown(times * 100.0**percent, "%" if percent == 1 else unit)
+    return NumberFormat(times * 100.0**percent, "%" if percent == 1 else unit)
 
 
 _QUOTED = re.compile(r'"([^"]*)"')
@@ -189,13 +189,13 @@ class _Sheet:
             return _NO_VALUE
         return self._wrong.get((column.place, row), "there is no value")
 
-    def _formats(self) -> dict[int, Shown]:
+    def _formats(self) -> dict[int, NumberFormat]:
         """Return what the number formats of the first rows make of their numbers, by place.
 
         Raises ``InputError`` for a column that shows some numbers as they are and others not.
         """
         at = self.layout.first + 1
-        formats: dict[int, set[Shown]] = {}
+        formats: dict[int, set[NumberFormat]] = {}
         with _opened(self.path, values=True) as book:
             sheet = book[self.name]
             sheet.reset_dimensions()
@@ -216,7 +216,7 @@ class _Sheet:
     def notes(self) -> Iterator[str]:
         """Yield a sentence for each column whose numbers are taken as its cells show them."""
         for column in self.layout.columns:
-            shown = self.shown.get(column.place, Shown())
+            shown = self.shown.get(column.place, NumberFormat())
             if shown.times != 1.0:
                 yield (
                     f"{column.name!r} is taken as its cells show it, {shown.times:g} times the "
@@ -387,7 +387,7 @@ def _check_parts(path: Path) -> None:
         with path.open("rb") as file:
             old = file.read(len(_OLD)) == _OLD
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be read: {system_text(error)}") from error
     if old:
         raise InputError(
             f"{path} is a workbook of Excel 97 to 2003, or one with a password: open it in a "

@@ -14,7 +14,7 @@ from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.content.layout import FORMAT
 from dearig.recording.content.safe import Refused, check_heaps, checked, item
-from dearig.recording.files import in_words, one_line
+from dearig.recording.files import one_line, system_text
 from dearig.recording.importers.formats.hdf5_attributes import own_scale, stated_step, unpacked
 from dearig.recording.importers.formats.hdf5_attributes import texts_in as _texts
 from dearig.recording.importers.formats.mat_file import OBJECTS
@@ -25,7 +25,7 @@ from dearig.recording.importers.formats.pandas_hdf5 import (
     is_index_group,
     time_kind,
 )
-from dearig.recording.importers.formats.stored import Stored, StoredColumns
+from dearig.recording.importers.formats.stored import StoredColumn, StoredColumns
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.units import unit_of
 from dearig.recording.importers.source import PARSER_FAILURES, printable
@@ -63,7 +63,7 @@ class Hdf5File(StoredColumns):
                 # the text before it may name another version
                 matlab = head.startswith(b"MATLAB") and head.startswith(_SIGNATURE, _BEHIND)
         except OSError as error:
-            raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+            raise InputError(f"{path} cannot be read: {system_text(error)}") from error
         what = "a MAT file of version 7.3" if matlab else "an HDF5 file"
         try:
             check_heaps(path)
@@ -91,12 +91,14 @@ class _Walk:
         self.notes: list[str] = []
         self.objects = False  # of MATLAB, which cannot be read
 
-    def columns(self) -> Iterator[tuple[str, Stored]]:
+    def columns(self) -> Iterator[tuple[str, StoredColumn]]:
         """Yield every column with its path."""
         for name, column in self._in_group(self._file, "", 0):
             yield printable(name), column
 
-    def _in_group(self, group: h5py.Group, path: str, depth: int) -> Iterator[tuple[str, Stored]]:
+    def _in_group(
+        self, group: h5py.Group, path: str, depth: int
+    ) -> Iterator[tuple[str, StoredColumn]]:
         place = h5py.h5o.get_info(group.id).addr
         if depth > DEEPEST or place in self._groups:
             return
@@ -144,7 +146,7 @@ class _Walk:
 
     def _in_dataset(
         self, data: h5py.Dataset, path: str, table: str, depth: int, axis: bool
-    ) -> Iterator[tuple[str, Stored]]:
+    ) -> Iterator[tuple[str, StoredColumn]]:
         if "MATLAB_object_decode" in data.attrs:
             self.objects = True
             return
@@ -159,7 +161,7 @@ class _Walk:
 
     def _in_numbers(
         self, data: h5py.Dataset, path: str, table: str, axis: bool
-    ) -> Iterator[tuple[str, Stored]]:
+    ) -> Iterator[tuple[str, StoredColumn]]:
         own, group = path.rpartition(self._between)[2], table
         if own.lower() in _GENERIC and table:
             group, _, own = table.rpartition(self._between)
@@ -180,7 +182,7 @@ class _Walk:
                 own = index_name(data.parent, data, own) or own
             yield (
                 path,
-                Stored(
+                StoredColumn(
                     self._loader(data.name, _flat, unpack, kind), int(data.size), own,
                     "s" if kind else unit, "time" if kind else label, group, step, scaled=scaled,
                 ),
@@ -207,13 +209,13 @@ class _Walk:
                 label = unit = ""
             elif told:
                 unit = told[place]
-            yield inside, Stored(
+            yield inside, StoredColumn(
                 self._loader(data.name, _row(place) if turned else _column(place), unpack, kind),
                 rows, own_name, "s" if kind else unit, "time" if kind else label,
                 path if names else group, step, scaled=scaled,
             )  # fmt: skip
 
-    def _in_fields(self, data: h5py.Dataset, path: str) -> Iterator[tuple[str, Stored]]:
+    def _in_fields(self, data: h5py.Dataset, path: str) -> Iterator[tuple[str, StoredColumn]]:
         if data.ndim != 1:
             if data.shape == () and {"base", "limit", "increment"} <= set(data.dtype.names):
                 yield from self._in_range(data, path)
@@ -238,14 +240,14 @@ class _Walk:
                     own = path.rpartition(self._between)[2]
                 yield (
                     f"{path}{self._between}{called}",
-                    Stored(
+                    StoredColumn(
                         self._loader(data.name, _field(name, place), None, times),
                         int(data.size), own, "s" if times else unit or "",
                         "time" if times else "", path,
                     ),
                 )  # fmt: skip
 
-    def _in_range(self, data: h5py.Dataset, path: str) -> Iterator[tuple[str, Stored]]:
+    def _in_range(self, data: h5py.Dataset, path: str) -> Iterator[tuple[str, StoredColumn]]:
         """Yield the values of a range, which Octave stores as base, limit and increment."""
         base, limit, step = (float(data[()][n]) for n in ("base", "limit", "increment"))
         count = (limit - base) / step if step else 0.0
@@ -254,9 +256,11 @@ class _Walk:
         size = round(count) + 1 if abs(count - round(count)) < 1e-6 else int(count) + 1
         table = path.rpartition(self._between)[0]
         own = (table if path.endswith("value") else path).rpartition(self._between)[2]
-        yield path, Stored(lambda: base + step * np.arange(size), size, own)
+        yield path, StoredColumn(lambda: base + step * np.arange(size), size, own)
 
-    def _in_cells(self, data: h5py.Dataset, path: str, depth: int) -> Iterator[tuple[str, Stored]]:
+    def _in_cells(
+        self, data: h5py.Dataset, path: str, depth: int
+    ) -> Iterator[tuple[str, StoredColumn]]:
         """Yield the columns behind references: cells, and fields of an array of structs."""
         if depth > DEEPEST or data.size > OBJECTS_MAX:
             return

@@ -15,9 +15,9 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.input_file import open_input, parse_json
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.importers.formats.cells import complaint_about, number_in, with_order
-from dearig.recording.importers.formats.stored import Stored, StoredColumns, stated_scale
+from dearig.recording.importers.formats.stored import StoredColumn, StoredColumns, stated_scale
 from dearig.recording.importers.formats.text_layout import TextColumn
 from dearig.recording.importers.formats.text_lines import encoding_of
 from dearig.recording.importers.importer import Importer
@@ -55,7 +55,7 @@ class JsonFile(StoredColumns):
 
     def __init__(self, path: Path) -> None:
         content, lines = _content(path)
-        columns: dict[str, Stored] = {}
+        columns: dict[str, StoredColumn] = {}
         for name, column in islice(_columns(content, "", "", lines, 0), COLUMNS_MAX):
             columns.setdefault(printable(name), column)
         super().__init__(path, "a JSON file", columns, separator=".")
@@ -67,7 +67,7 @@ def _content(path: Path) -> tuple[Json, bool]:
         with open_input(path) as file:
             raw = file.read(SIZE_MAX + 1)
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be read: {system_text(error)}") from error
     if len(raw) > SIZE_MAX:
         raise InputError(
             f"{path} is not read: a JSON file may have {SIZE_MAX / 1e6:.0f} MB; write CSV or "
@@ -89,7 +89,7 @@ def _content(path: Path) -> tuple[Json, bool]:
 
 def _columns(
     value: Json, path: str, table: str, lines: bool, depth: int
-) -> Iterator[tuple[str, Stored]]:
+) -> Iterator[tuple[str, StoredColumn]]:
     """Yield the columns in ``value`` by their paths."""
     if depth > DEEPEST:
         return
@@ -108,7 +108,7 @@ def _columns(
 
 def _in_object(
     value: Mapping[str, Json], path: str, table: str, depth: int
-) -> Iterator[tuple[str, Stored]]:
+) -> Iterator[tuple[str, StoredColumn]]:
     names, rows = value.get("columns"), value.get("data")
     if isinstance(names, list) and isinstance(rows, list) and _is_text(names) and _is_rows(rows):
         units = value.get("units")
@@ -220,7 +220,7 @@ def _described(value: Json) -> _Described | None:
 
 def _in_objects(
     rows: list[Mapping[str, Json]], path: str, table: str, lines: bool, depth: int
-) -> Iterator[tuple[str, Stored]]:
+) -> Iterator[tuple[str, StoredColumn]]:
     """Yield the columns of objects: each describes one, is a table of its own, or is a row."""
     looked_at = rows[:LOOKED_AT]
     described = [_described(row) for row in looked_at]
@@ -271,7 +271,7 @@ def _in_rows(
     path: str,
     lines: bool,
     units: Sequence[str] = (),
-) -> Iterator[tuple[str, Stored]]:
+) -> Iterator[tuple[str, StoredColumn]]:
     """Yield the columns of rows, whose first one may be the names."""
     if not rows:
         return
@@ -307,10 +307,10 @@ def _stored_rows(
     table: str,
     lines: bool,
     unit: str = "",
-) -> Stored:
+) -> StoredColumn:
     dated, label, began = _dated([get(row) for row in rows[:LOOKED_AT]])
     unit = unit or dated
-    return Stored(
+    return StoredColumn(
         lambda: _numbers([get(row) for row in rows]), len(rows), own, unit, label, table,
         cell=lambda index: _complaint(get(rows[index])),
         row=(lambda index: f"line {index + 1}") if lines else None, began=began,
@@ -319,10 +319,10 @@ def _stored_rows(
 
 def _stored(
     values: list[Json], own: str, table: str, unit: str = "", label: str = "", scaled: str = ""
-) -> Stored:
+) -> StoredColumn:
     dated = _dated(values[:LOOKED_AT])
     unit, label = unit or dated[0], label or dated[1]
-    return Stored(
+    return StoredColumn(
         lambda: _numbers(values), len(values), own, unit, label, table,
         cell=lambda index: _complaint(values[index]), began=dated[2], scaled=scaled,
     )  # fmt: skip

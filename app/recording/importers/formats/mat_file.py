@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.importers.formats.mat5 import (
     FIELDS_MAX,
     ITEMS_MAX,
@@ -24,7 +24,7 @@ from dearig.recording.importers.formats.mat5 import (
     Value,
     variables,
 )
-from dearig.recording.importers.formats.stored import Stored, StoredColumns
+from dearig.recording.importers.formats.stored import StoredColumn, StoredColumns
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import printable
 
@@ -48,7 +48,7 @@ class MatFile(StoredColumns):
 
     def __init__(self, path: Path) -> None:
         found = _load(path)
-        columns: dict[str, Stored] = {}
+        columns: dict[str, StoredColumn] = {}
         for top, value in found.items():
             for name, column in islice(_columns(value, top, top, ""), ITEMS_MAX):
                 columns[printable(name)] = column
@@ -62,7 +62,7 @@ class MatFile(StoredColumns):
         )  # fmt: skip
 
 
-def _columns(value: Value, path: str, own: str, table: str) -> Iterator[tuple[str, Stored]]:
+def _columns(value: Value, path: str, own: str, table: str) -> Iterator[tuple[str, StoredColumn]]:
     """Yield the columns in ``value``, which is called ``path``."""
     if isinstance(value, dict):
         told = {name.lower(): text for name, text in value.items() if isinstance(text, str)}
@@ -86,7 +86,7 @@ def _columns(value: Value, path: str, own: str, table: str) -> Iterator[tuple[st
                 yield f"{path}[{i}]", _stored(value[:, i], f"{own}[{i}]", table)
 
 
-def _in_cells(cells: Cells, path: str, own: str, table: str) -> Iterator[tuple[str, Stored]]:
+def _in_cells(cells: Cells, path: str, own: str, table: str) -> Iterator[tuple[str, StoredColumn]]:
     """Yield the columns in ``cells``: each is one or more, or a number or text of a table."""
     if len(cells) == 1:
         yield from _columns(cells[0], path, own, table)
@@ -116,19 +116,19 @@ def _number(cell: Value) -> float:
     return float("nan")
 
 
-def _stored(values: np.ndarray, own: str, table: str) -> Stored:
-    return Stored(lambda: values, int(values.size), own, table=table)
+def _stored(values: np.ndarray, own: str, table: str) -> StoredColumn:
+    return StoredColumn(lambda: values, int(values.size), own, table=table)
 
 
-def _with_unit(column: Stored, unit: str) -> Stored:
-    return Stored(column.load, column.size, column.own, unit, table=column.table)
+def _with_unit(column: StoredColumn, unit: str) -> StoredColumn:
+    return StoredColumn(column.load, column.size, column.own, unit, table=column.table)
 
 
 def _load(path: Path) -> dict[str, Value]:
     try:
         return variables(path.read_bytes())
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be read: {system_text(error)}") from error
     except Damaged as error:
         raise InputError(f"{path} {error}") from error
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.input_file import open_input
-from dearig.recording.files import in_words
-from dearig.recording.importers.formats.stored import Stored, StoredColumns
+from dearig.recording.files import system_text
+from dearig.recording.importers.formats.stored import StoredColumn, StoredColumns
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import printable
 
@@ -38,13 +38,13 @@ class OctaveFile(StoredColumns):
             with open_input(path) as file:
                 raw = file.read(SIZE_MAX + 1)
         except OSError as error:
-            raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+            raise InputError(f"{path} cannot be read: {system_text(error)}") from error
         if len(raw) > SIZE_MAX:
             raise InputError(
                 f"{path} is not read: a text file of Octave may have {SIZE_MAX / 1e6:.0f} MB; save "
                 f"it with -v7"
             )
-        columns: dict[str, Stored] = {}
+        columns: dict[str, StoredColumn] = {}
         try:
             for name, column in _Reader(raw.decode("utf-8", "replace")).variables():
                 columns[printable(name)] = column
@@ -74,7 +74,7 @@ class _Reader:
             raise ValueError(f"line {self._at} does not say {key}")
         return match[2].strip()
 
-    def variables(self) -> Iterator[tuple[str, Stored]]:
+    def variables(self) -> Iterator[tuple[str, StoredColumn]]:
         """Yield the columns of all variables."""
         while self._at < len(self._lines):
             match = _LINE.fullmatch(self._lines[self._at].rstrip())
@@ -83,7 +83,7 @@ class _Reader:
             else:
                 self._at += 1
 
-    def _variable(self, path: str) -> Iterator[tuple[str, Stored]]:
+    def _variable(self, path: str) -> Iterator[tuple[str, StoredColumn]]:
         name = self._word("name")
         kind = self._word("type").removeprefix("global ")
         inside = f"{path}.{name}" if path else name
@@ -102,7 +102,9 @@ class _Reader:
                 yield from self._variable(inside)
         # texts and other kinds are passed over, line by line
 
-    def _numbers(self, kind: str, name: str, path: str, table: str) -> Iterator[tuple[str, Stored]]:
+    def _numbers(
+        self, kind: str, name: str, path: str, table: str
+    ) -> Iterator[tuple[str, StoredColumn]]:
         if kind.endswith("range"):
             self._next()  # # base, limit, increment
             base, limit, step = map(float, self._next().split()[:3])
@@ -141,8 +143,8 @@ class _Reader:
             yield f"{path}[{place}]", _stored(matrix[:, place], f"{name}[{place}]", table)
 
 
-def _stored(values: np.ndarray, own: str, table: str) -> Stored:
-    return Stored(lambda: values, values.size, own, table=table)
+def _stored(values: np.ndarray, own: str, table: str) -> StoredColumn:
+    return StoredColumn(lambda: values, values.size, own, table=table)
 
 
 def _sniff(head: bytes) -> bool:

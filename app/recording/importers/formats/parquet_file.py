@@ -12,7 +12,7 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.recording.files import one_line
-from dearig.recording.importers.formats.stored import Stored, StoredColumns, stated_scale
+from dearig.recording.importers.formats.stored import StoredColumn, StoredColumns, stated_scale
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import PARSER_FAILURES, printable
 
@@ -49,7 +49,7 @@ class ParquetFile(StoredColumns):
             name = ".".join(place)
             if printable(name) in columns:
                 raise InputError(f"{path}: two columns are called {name!r}; rename one")
-            columns[printable(name)] = Stored(
+            columns[printable(name)] = StoredColumn(
                 self._loader(place), rows, place[-1], unit, "time" if is_date else "",
                 ".".join(place[:-1]),
                 cell=self._cell(name),

@@ -22,7 +22,7 @@ from dearig.recording.importers.source import (
 )
 
 __all__ = [
-    "Stored",
+    "StoredColumn",
     "StoredColumns",
     "as_numbers",
     "is_thinned",
@@ -33,7 +33,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredColumn:
     """A column (n,) of a file.
 
     Attributes
@@ -78,7 +78,7 @@ class Stored:
     scaled: str = ""
 
 
-class StoredColumns(NamedColumns[Stored]):
+class StoredColumns(NamedColumns[StoredColumn]):
     """The ``columns`` of the file at ``path``, by their paths; see ``Source``.
 
     ``what`` the file should be ("an HDF5 file") is for messages. ``separator`` stands between the
@@ -91,7 +91,7 @@ class StoredColumns(NamedColumns[Stored]):
         self,
         path: Path,
         what: str,
-        columns: Mapping[str, Stored],
+        columns: Mapping[str, StoredColumn],
         *,
         separator: str = "/",
         about: Mapping[str, str] = MappingProxyType({}),
@@ -248,7 +248,7 @@ class StoredColumns(NamedColumns[Stored]):
 START_APART = 0.01
 
 
-def _same_timing(one: Stored, other: Stored) -> bool:
+def _same_timing(one: StoredColumn, other: StoredColumn) -> bool:
     step, second = one.step_s or 0.0, other.step_s or 0.0
     return bool(
         np.isclose(step, second, rtol=1e-9, atol=0.0)

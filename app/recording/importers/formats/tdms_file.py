@@ -19,7 +19,7 @@ from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import one_line
 from dearig.recording.importers.formats.stored import (
-    Stored,
+    StoredColumn,
     StoredColumns,
     is_thinned,
     rate_step,
@@ -55,7 +55,7 @@ class TdmsChannels(StoredColumns):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        columns: dict[str, Stored] = {}
+        columns: dict[str, StoredColumn] = {}
         with _opened(path) as file:
             size = path.stat().st_size
             claimed = sum(len(channel) for group in file.groups() for channel in group.channels())
@@ -80,16 +80,16 @@ class TdmsChannels(StoredColumns):
         super().__init__(path, "a TDMS file", columns, cut_short=_is_cut_short(path))
         #: date and time of the first sample of the waveforms
         self.started = None if first is None else _moment(first)
-        self.doubts = _appended(path)
+        self.warnings = _appended(path)
 
-    def _stored(self, channel: TdmsChannel, first: TdmsTimestamp | None) -> Stored:
+    def _stored(self, channel: TdmsChannel, first: TdmsTimestamp | None) -> StoredColumn:
         told: Mapping[str, object] = channel.properties
         step, unit = _step(channel, self._groups.get(channel.group_name, {}))
         start, started = _number(told.get("wf_start_offset")), _started(channel)
         if started is not None and first is not None:
             start += _seconds(started, first)
         dates = channel.dtype.kind == "M"
-        return Stored(
+        return StoredColumn(
             _loader(self.path, channel.group_name, channel.name), len(channel), channel.name,
             "s" if dates else unit,
             "time" if dates else str(told.get("description", "")),

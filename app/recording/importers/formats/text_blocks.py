@@ -11,7 +11,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.input_file import open_input
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 
 __all__ = ["BytesReader", "blocks_of", "halves_of"]
 
@@ -68,7 +68,7 @@ def blocks_of(
                 yield line, piece[at:]
                 line += count
     except (OSError, UnicodeError) as error:
-        said = in_words(error) if isinstance(error, OSError) else str(error)
+        said = system_text(error) if isinstance(error, OSError) else str(error)
         raise InputError(f"{path} cannot be read: {said}") from error
 
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.input_file import open_input
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.importers.formats.cells import (
     cell_of,
     complaint_about,
@@ -45,7 +45,7 @@ from dearig.recording.importers.formats.text_layout import (
 )
 from dearig.recording.importers.formats.text_lines import cells_of, encoding_of, holds_data
 from dearig.recording.importers.formats.text_sections import TextSection, sections_of
-from dearig.recording.importers.formats.text_table import Table
+from dearig.recording.importers.formats.text_table import GrowingColumns
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.quantities.moments import first_moment
 from dearig.recording.importers.quantities.text_numbers import GROUPED, signs_of
@@ -94,7 +94,7 @@ class TextFile(NamedColumns[TextColumn]):
             with open_input(path) as file:
                 raw = file.read(_HEAD)
         except OSError as error:
-            raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+            raise InputError(f"{path} cannot be read: {system_text(error)}") from error
         encoding = encoding_of(raw, path)
         try:
             head = codecs.getincrementaldecoder(encoding)().decode(raw, len(raw) < _HEAD)
@@ -223,7 +223,9 @@ class TextFile(NamedColumns[TextColumn]):
                 break
         return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
 
-    def _read_rows(self, wanted: list[TextColumn], skip: bool, counts: bool = False) -> Table:
+    def _read_rows(
+        self, wanted: list[TextColumn], skip: bool, counts: bool = False
+    ) -> GrowingColumns:
         """Return the rows of the columns ``wanted``; leave wrong ones out if ``skip``.
 
         With ``counts`` it is only asked how many are wrong: raises ``_HopelessError`` once most
@@ -231,7 +233,7 @@ class TextFile(NamedColumns[TextColumn]):
         """
         self.skipped, self._spans, self._wanted, self._pointed = [], [], wanted, set()
         self._leaves_out, self._counts = skip, counts
-        table = Table(0 if counts else len(wanted))
+        table = GrowingColumns(0 if counts else len(wanted))
         size = left = self._size
         for line, block, values in self._parsed():
             self._keep(line, block, values, table, left)
@@ -370,7 +372,12 @@ class TextFile(NamedColumns[TextColumn]):
                 yield first, whole, found.result()
 
     def _keep(
-        self, line: int, block: bytes, values: list[np.ndarray] | None, table: Table, left: int
+        self,
+        line: int,
+        block: bytes,
+        values: list[np.ndarray] | None,
+        table: GrowingColumns,
+        left: int,
     ) -> None:
         """Append the rows of ``block`` to ``table``; of ``left`` bytes of the file, it is a part.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from dearig.errors import InputError
 from dearig.input_file import open_input
-from dearig.recording.files import in_words
+from dearig.recording.files import system_text
 from dearig.recording.importers.formats.text_layout import TextLayout, is_row
 from dearig.recording.importers.formats.text_lines import cells_of
 from dearig.recording.importers.source import printable
@@ -51,7 +51,7 @@ def sections_of(path: Path, layout: TextLayout, names: str) -> tuple[TextSection
         with open_input(path) as file:
             raw = file.read()
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be read: {system_text(error)}") from error
     encoding = {"utf-8-sig": "utf-8", "utf-16": "utf-16-le"}.get(layout.encoding, layout.encoding)
     if raw.count(names.strip().encode(encoding, "replace")) < 2:
         return ()

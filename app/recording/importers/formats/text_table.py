@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["Table"]
+__all__ = ["GrowingColumns"]
 
 #: Room for rows, in multiples of those that the first block lets expect.
 ROOM = 1.05
 
 
-class Table:
+class GrowingColumns:
     """Columns that grow by blocks of rows; ``rows`` of them are there.
 
     Each has memory of its own, which is given back once no one needs that column any more. A table

@@ -6,7 +6,7 @@ import math
 
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Parameter
-from dearig.model.effects.shared.general import Axis, Steps, Weights, general
+from dearig.model.effects.shared.general import Axis, SmoothSteps, Weights, general
 from dearig.model.effects.shared.splines import even, spline
 
 __all__ = ["EFFECT", "supply"]
@@ -20,7 +20,7 @@ EFFECT = general(
     acts_on="amplifier",
     summary="the voltage at the film is a smooth curve of the command",
     equations=(r"V = U + \operatorname{sign}(U) \sum_{i=1}^{6} a_i B_i(|U|)",),
-    shapes=Steps(_KNOTS, "with its knots at i - 2, i - 1 and i times V_f/5, none below 0"),
+    shapes=SmoothSteps(_KNOTS, "with its knots at i - 2, i - 1 and i times V_f/5, none below 0"),
     weights=Weights(
         "gained", "a", "V", (-2e3, 2e3), "at step", 10.0, stands_for="weight of step i"
     ),

@@ -11,7 +11,7 @@ import numpy as np
 
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.hooks import FASTEST
-from dearig.model.effects.shared.general import Axis, Steps, Weights, general
+from dearig.model.effects.shared.general import Axis, SmoothSteps, Weights, general
 from dearig.model.effects.shared.splines import rise, spline
 
 __all__ = ["EFFECT", "stiffness", "stress"]
@@ -21,7 +21,7 @@ _PLACES = (6e-3, 1.8e-2, 5.4e-2, 0.162, 0.486)  # 1/s
 _KNOTS = (0.0, 0.0, *_PLACES, math.inf)
 
 
-class _OverRates(Steps):
+class _OverRates(SmoothSteps):
     def range(self) -> np.ndarray:
         """Return rates of every order."""
         return np.concatenate(([0.0], np.geomspace(2e-4, FASTEST, 60)))

@@ -7,7 +7,7 @@ import numpy as np
 from dearig.model.coefficients import HELD, THICKNESS
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Parameter
-from dearig.model.effects.shared.general import Axis, Steps, Weights, general
+from dearig.model.effects.shared.general import Axis, SmoothSteps, Weights, general
 from dearig.model.effects.shared.splines import even, spline
 from dearig.model.kinematics import thinning_squared
 
@@ -17,7 +17,7 @@ _STEPS = 6
 _KNOTS = tuple(knot * knot for knot in even(_STEPS, 5, at_rest=True))
 
 
-class _OverFields(Steps):
+class _OverFields(SmoothSteps):
     def range(self) -> np.ndarray:
         """Return even fields."""
         return np.sqrt(super().range()[-1]) * np.linspace(0.0, 1.0, 60)

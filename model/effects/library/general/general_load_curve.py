@@ -8,7 +8,7 @@ from __future__ import annotations
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Parameter
-from dearig.model.effects.shared.general import Axis, Steps, Weights, general
+from dearig.model.effects.shared.general import Axis, SmoothSteps, Weights, general
 from dearig.model.effects.shared.splines import even, rise, spline
 
 __all__ = ["EFFECT", "stiffness", "stress"]
@@ -22,7 +22,7 @@ EFFECT = general(
     acts_on="load",
     summary="a force that changes with the position, in any form, at any speed",
     equations=(r"\sigma = \sigma_0 + \sum_{i=1}^{6} f_i B_i(\lambda - \lambda_0)",),
-    shapes=Steps(_KNOTS, "with its knots at i - 2, i - 1 and i times r/5, none below 0"),
+    shapes=SmoothSteps(_KNOTS, "with its knots at i - 2, i - 1 and i times r/5, none below 0"),
     weights=Weights(
         "gained", "f", "Pa", (-1e5, 1e5), "at step", 10.0, stands_for="stress gained at step i"
     ),

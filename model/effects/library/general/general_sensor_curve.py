@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Parameter
-from dearig.model.effects.shared.general import Axis, Steps, Weights, general
+from dearig.model.effects.shared.general import Axis, SmoothSteps, Weights, general
 from dearig.model.effects.shared.splines import even, spline
 
 __all__ = ["EFFECT", "sense"]
@@ -21,7 +21,7 @@ EFFECT = general(
     acts_on="sensor",
     summary="the reading is a smooth curve of the position",
     equations=(r"r = x + \sum_{i=1}^{8} a_i B_i(x)",),
-    shapes=Steps(_KNOTS, "with its knots at i - 1, i and i + 1 times x_f/8"),
+    shapes=SmoothSteps(_KNOTS, "with its knots at i - 1, i and i + 1 times x_f/8"),
     weights=Weights(
         "error", "a", "m", (-1e-3, 1e-3), "gained at step", 3e-6, stands_for="weight of step i"
     ),

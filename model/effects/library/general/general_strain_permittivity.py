@@ -5,7 +5,7 @@ from __future__ import annotations
 from dearig.model.coefficients import REST
 from dearig.model.compiled.jit import jit
 from dearig.model.effects.description import Parameter
-from dearig.model.effects.shared.general import Axis, Steps, Weights, general
+from dearig.model.effects.shared.general import Axis, SmoothSteps, Weights, general
 from dearig.model.effects.shared.splines import even, spline
 
 __all__ = ["EFFECT", "permittivity"]
@@ -22,7 +22,7 @@ EFFECT = general(
         r"\sigma_E = \max\left(1 + \sum_{i=1}^{6} a_i B_i(\lambda - \lambda_0), "
         r"0.05\right) \sigma_M",
     ),
-    shapes=Steps(_KNOTS, "with its knots at i - 2, i - 1 and i times r/5, none below 0"),
+    shapes=SmoothSteps(_KNOTS, "with its knots at i - 2, i - 1 and i times r/5, none below 0"),
     weights=Weights(
         "change", "a", "", (-1.0, 1.0), "of the permittivity at step", 5e-3,
         stands_for="weight of step i",
