@@ -44,7 +44,7 @@ def same(first: Recording, second: Recording) -> None:
 @pytest.mark.parametrize("to", EXPORTS)
 def test_a_run_comes_back_to_the_last_bit(tmp_path: Path, run: Path, to: str) -> None:
     out = export_recording(run, to, tmp_path / f"run.{to}")
-    assert import_file(out, tmp_path / "again.h5", now=Clock()).doubts == ()
+    assert import_file(out, tmp_path / "again.h5", now=Clock()).warnings == ()
     first, second = open_recording(run), open_recording(tmp_path / "again.h5")
     same(first, second)
     for what in ("hold", "film", "load", "kinematics", "sequence_toml"):
@@ -59,8 +59,8 @@ def test_a_table_that_was_changed_is_not_described_by_the_file_beside_it(
     out = export_recording(run, "csv", tmp_path / "run.csv")
     first, rest = out.read_text("utf-8").split("\n", 1)
     out.write_text(f"{first}\n{rest.split(chr(10), 1)[1]}", "utf-8")
-    doubts = import_file(out, tmp_path / "again.h5", now=Clock()).doubts
-    assert any("run.csv-metadata.json does not describe this table" in text for text in doubts)
+    warnings = import_file(out, tmp_path / "again.h5", now=Clock()).warnings
+    assert any("run.csv-metadata.json does not describe this table" in text for text in warnings)
     assert open_recording(tmp_path / "again.h5").film is None
     (tmp_path / "run.csv-metadata.json").write_text("[" * 100_000, "utf-8")
     import_file(out, tmp_path / "other.h5", now=Clock())
@@ -167,7 +167,7 @@ def test_measured_data_make_the_round(tmp_path: Path, name: str, to: str) -> Non
     source = measured_data() / name
     first, second = tmp_path / "first.h5", tmp_path / "second.h5"
     import_file(source, first, ImportOptions(gauge_length_mm=80, area_mm2=22), now=Clock())
-    assert import_file(export_recording(first, to), second, now=Clock()).doubts == ()
+    assert import_file(export_recording(first, to), second, now=Clock()).warnings == ()
     same(open_recording(first), open_recording(second))
     assert open_recording(second).kinematics == "uniaxial"
 

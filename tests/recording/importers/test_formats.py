@@ -447,7 +447,7 @@ def big_endian() -> bytes:
 def test_tdms_of_a_big_endian_computer(tmp_path: Path) -> None:
     path = tmp_path / "in.tdms"
     path.write_bytes(big_endian())
-    assert not any("ends early" in doubt for doubt in imported(path).doubts)
+    assert not any("ends early" in doubt for doubt in imported(path).warnings)
     same(open_recording(tmp_path / "out.h5"))
 
 
@@ -458,7 +458,7 @@ def test_tdms_that_was_not_closed(tmp_path: Path) -> None:
     last = whole[:12] + struct.pack("<Q", 2**64 - 1) + whole[20:]
     path.write_bytes(whole + last[: -8 * 20])
     done = imported(path)
-    assert any("ends early" in doubt for doubt in done.doubts)
+    assert any("ends early" in doubt for doubt in done.warnings)
     assert open_recording(tmp_path / "out.h5").samples == 2 * ROWS - 20
 
 
@@ -488,7 +488,7 @@ def test_rows_of_a_parquet_file_without_values_are_left_out(tmp_path: Path) -> N
     with refused("row 8, column 'displacement_mm': there is no value; 2 of 60 rows are so; --"):
         imported(path)
     done = imported(path, skip_bad_rows=True)
-    assert any("2 rows were left out" in doubt for doubt in done.doubts)
+    assert any("2 rows were left out" in doubt for doubt in done.warnings)
     np.testing.assert_allclose(open_recording(tmp_path / "out.h5").time, np.delete(TIME, [7, 9]))
 
 

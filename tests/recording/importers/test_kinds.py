@@ -199,7 +199,7 @@ def test_bad_rows_are_left_out_counted_and_kept_as_events(tmp_path: Path) -> Non
     run = open_recording(tmp_path / "out.h5")
     kept = np.delete(np.arange(ROWS), [9, 28])
     np.testing.assert_allclose(run.time, TIME[kept], atol=1e-12)
-    assert any("4 rows were left out" in doubt for doubt in done.doubts)
+    assert any("4 rows were left out" in doubt for doubt in done.warnings)
     said = [(e.sample, e.message) for e in run.events if "left out before" in e.message]
     assert [(at, words.rpartition(": ")[2]) for at, words in said] == [
         (9, "line 11"), (18, "line 21"), (27, "line 31"), (57, "line 63"),
@@ -228,7 +228,7 @@ def test_rest_is_found_by_its_own_noise(tmp_path: Path) -> None:
 def test_data_without_a_rest_say_so(tmp_path: Path) -> None:
     lines = table().splitlines()
     done = imported(tmp_path, "\n".join([lines[0], *lines[35:]]))
-    assert any("no quiet lead-in" in doubt for doubt in done.doubts)
+    assert any("no quiet lead-in" in doubt for doubt in done.warnings)
 
 
 def test_columns_are_listed_with_what_they_seem_to_be(tmp_path: Path) -> None:

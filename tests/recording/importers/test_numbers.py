@@ -181,7 +181,7 @@ def test_the_first_rows_count_even_if_they_cannot_be_read(tmp_path: Path) -> Non
         imported(tmp_path, "\n".join(lines))
     done, run = imported(tmp_path, "\n".join(lines), skip_bad_rows=True)
     assert run.samples == TIME.size - 2
-    assert "2 rows were left out because they could not be used" in done.doubts
+    assert "2 rows were left out because they could not be used" in done.warnings
 
 
 def test_true_strain_beside_engineering_strain_is_no_displacement(tmp_path: Path) -> None:

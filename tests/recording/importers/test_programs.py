@@ -360,6 +360,6 @@ def test_a_tdms_file_that_was_continued_is_said(tmp_path: Path, again: float) ->
                 [ChannelObject("rig", n, v[part], about) for n, v in list(COLUMNS.items())[1:]]
             )
     done = imported(path)
-    assert any("was continued" in d and "60 s after its start" in d for d in done.doubts) == (
+    assert any("was continued" in d and "60 s after its start" in d for d in done.warnings) == (
         again > 0
     )

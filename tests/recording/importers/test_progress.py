@@ -154,7 +154,7 @@ def test_a_scale_that_overrules_the_unit_of_a_name_is_said(tmp_path: Path) -> No
     said = import_file(path, out, ImportOptions(columns={"displacement_mm": "displacement_mm*-2"}))
     assert "displacement in mm from 'displacement_mm', scaled *-2" in said.columns
     assert any("although its name says mm" in note for note in said.notes)
-    assert any("its sign right" in doubt for doubt in said.doubts)
+    assert any("its sign right" in doubt for doubt in said.warnings)
     np.testing.assert_allclose(open_recording(out).displacement, -2.0 * MOVED, rtol=1e-9, atol=1e-9)
     # the same unit said in another way is not a contradiction
     options = ImportOptions(columns={"displacement_um": "displacement_mm*1000"})

@@ -200,7 +200,7 @@ def stamped(path: Path, stamps: list[str], names: str = "Timestamp") -> Path:
 def test_a_clock_that_is_set_by_an_hour_is_said(tmp_path: Path, hour: int, said: str) -> None:
     wall = [BEGAN + timedelta(seconds=10 * i, hours=hour * (i >= 30)) for i in range(ROWS)]
     done = imported(stamped(tmp_path / "in.csv", [f"{w}" for w in wall]))
-    assert any(said in doubt and "line 31" in doubt for doubt in done.doubts)
+    assert any(said in doubt and "line 31" in doubt for doubt in done.warnings)
     run = open_recording(tmp_path / "out.h5")
     expected = 10.0 * np.arange(ROWS)
     if hour > 0:  # it may have been a pause: the stamps are kept
@@ -250,7 +250,7 @@ def test_a_marker_for_no_reading_is_named_and_its_rows_left_out(
         np.where((np.arange(ROWS) > 40) & (np.arange(ROWS) < 50), marker, moved),
     )  # fmt: skip
     done = imported(path)
-    assert any(f"9 readings of 'Displacement (mm)' are {marker:.9g}" in d for d in done.doubts)
+    assert any(f"9 readings of 'Displacement (mm)' are {marker:.9g}" in d for d in done.warnings)
     run = open_recording(tmp_path / "out.h5")
     np.testing.assert_allclose(run.time, np.delete(TIME, np.arange(41, 50)))
     assert np.ptp(run.displacement) < 1e-3

@@ -126,7 +126,7 @@ def test_a_jump_of_the_time_is_said(tmp_path: Path) -> None:
     for ahead, said in ((3600.0, "did summer time begin"), (60.0, "was the clock set")):
         late = TIME + ahead * (np.arange(ROWS) >= 30)
         done = imported(write(tmp_path, late, VOLTAGE, 1e3 * MOVED))
-        assert any(said in doubt and "line 31" in doubt for doubt in done.doubts)
+        assert any(said in doubt and "line 31" in doubt for doubt in done.warnings)
 
 
 def test_days_that_are_called_seconds_are_led_on(tmp_path: Path) -> None:

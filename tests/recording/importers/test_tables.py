@@ -149,7 +149,7 @@ def test_cells_of_a_workbook_that_are_no_numbers(tmp_path: Path) -> None:
     with refused("sheet 'Log', row 11, column 'voltage_V': 'OVER' is not a"):
         imported(path)
     done = imported(path, skip_bad_rows=True)
-    assert any("3 rows were left out" in doubt for doubt in done.doubts)
+    assert any("3 rows were left out" in doubt for doubt in done.warnings)
     run = open_recording(tmp_path / "out.h5")
     np.testing.assert_allclose(run.time, np.delete(TIME, [9, 19]))
     assert any("row 63" in event.message for event in run.events)
