@@ -72,7 +72,7 @@ class NotifyTable(TomlTable):
 
     command: list[str] = Field(
         default_factory=list, max_length=100, description="a program and its arguments",
-        examples=[["program", "--option"]],
+        examples=[["program", "argument"]],
     )  # fmt: skip
     webhook: str = Field(
         default="", description="an address that takes JSON, or env:NAME for a variable with one"
