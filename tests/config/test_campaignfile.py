@@ -135,7 +135,7 @@ def test_a_setting_changes_its_key_and_nothing_else(tmp_path: Path) -> None:
         (HEAD + '[after]\nmodel = "/m.toml"\n', "after.model"),
         (HEAD + "[after]\nvalidate = true\n", "after.validate has no model"),
         (HEAD + "[after]\nidentify = true\nbranches = 9\n", "a whole number from 1 to 8"),
-        (HEAD + '[notify]\ncommand = "x"\n', 'a list of texts such as ["program", "--option"]'),
+        (HEAD + '[notify]\ncommand = "x"\n', 'a list of texts such as ["program", "argument"]'),
         (HEAD + '[notify]\non = ["end"]\n', '"run-ended" or "tripped" or "queue-stopped"'),
         (HEAD + "[notify]\non = []\n", "notify.on"),
         (HEAD + 'repeat_after = "arc"\n', 'a list of "input-overflow" or'),
