@@ -17,7 +17,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2 as chi_square
+from scipy.special import chdtri
 
 from dearig.model.fitting.intervals import (
     CHI2_95,
@@ -131,7 +131,7 @@ class Valleys:
         if fewer == 0:
             return self.best.threshold
         each = 0.95 ** (1.0 / len(_places(self)))
-        return self.best.inflation * float(chi_square.ppf(each, _NUMBERS * fewer))
+        return self.best.inflation * float(chdtri(_NUMBERS * fewer, 1.0 - each))
 
     def at(self, sites: Sequence[int]) -> Optimum:
         """Return the optimum with the spare branches at ``sites``, where each branch stays.

@@ -33,6 +33,12 @@ def test_opening_a_recording_needs_no_plotting_and_no_window() -> None:
     assert not {name.partition(".")[0] for name in modules} & {"matplotlib", "PySide6", "pandas"}
 
 
+def test_a_fit_waits_for_no_library_that_it_may_not_need() -> None:
+    modules = modules_after("from dearig.model.diagnosis import diagnose")
+    # each takes half a second or more
+    assert not modules & {"scipy.stats", "scipy.signal", "matplotlib", "pandas"}
+
+
 @pytest.mark.parametrize("name", dearig.__all__)
 def test_every_name_of_the_interface_is_there_and_documented(name: str) -> None:
     assert name in dir(dearig)
