@@ -11,6 +11,7 @@ __all__ = [
     "SHOWN_CHANNELS",
     "Shown",
     "ShownChannel",
+    "counted",
     "in_digits",
     "name_and_unit",
     "parameter_key",
@@ -151,9 +152,12 @@ def name_and_unit(key: str) -> tuple[str, str]:
     return key.replace("_", " "), ""
 
 
-def runs_text(count: int, verb: str = "") -> str:
-    """Return a number of runs in words; with ``verb`` "is" or "are" follows it."""
-    one = count == 1
-    return f"{count:,} run{'' if one else 's'}" + (
-        f" {'is' if one else 'are'} {verb}" if verb else ""
-    )
+def counted(count: int, one: str) -> str:
+    """Return a number of things, each of which is called ``one``."""
+    return f"{count:,} {one}{'' if count == 1 else 's'}"
+
+
+def runs_text(count: int, state: str = "") -> str:
+    """Return a number of runs, or that they are in a ``state`` such as "left"."""
+    runs = counted(count, "run")
+    return f"{runs} {'is' if count == 1 else 'are'} {state}" if state else runs

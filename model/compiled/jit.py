@@ -204,9 +204,9 @@ class _FunctionCache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the kernel read for ``sig``; None where there is none.
 
-        Numba first imports all that it can compile, a sixth of the time until a command has its
-        first kernel. What was compiled needs none of it but the names of numba's run-time library,
-        and what has to be compiled has it imported by the compiler.
+        Numba's own method first imports all that its compiler knows. Code that is read needs only
+        the names of numba's run-time library, and the compiler imports the rest where it has to
+        compile.
         """
         rtsys.initialize(target_context)
         return cast(Any, super())._load_overload(sig, target_context)

@@ -382,17 +382,17 @@ class Learner:
         )
         expected = self._ratio * moved
         shown, predicted = self._around(np.abs(more + moved - expected)), self._around(expected)
-        told = np.flatnonzero(predicted > self._settings.told * noise)
-        if told.size == 0:
+        clear = np.flatnonzero(predicted > self._settings.told * noise)
+        if clear.size == 0:
             return np.full(shown.size, np.inf), np.zeros(shown.size, dtype=bool)
-        ratio = np.sqrt(np.maximum(shown - noise, 0.0)[told] / predicted[told])
+        ratio = np.sqrt(np.maximum(shown - noise, 0.0)[clear] / predicted[clear])
         lines = np.arange(shown.size)
-        off, last = np.interp(lines, told, ratio), self._stated_up_to
+        off, last = np.interp(lines, clear, ratio), self._stated_up_to
         # what the ratio corrects for at the last line of the path grows beyond it
         corrected = abs(self._ratio[last] / abs(self._ratio[0]) - 1.0)
         grown = max(off[last], corrected) * (lines / last) ** 2
         seen = np.zeros(shown.size, dtype=bool)
-        seen[told] = True
+        seen[clear] = True
         return np.where(lines > last, np.maximum(off, grown), off), seen
 
     def _film_over_model(self, lacking: np.ndarray) -> tuple[np.ndarray, int]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -105,19 +105,9 @@ class Valleys:
     firm: tuple[int, ...]
     points: Mapping[tuple[int, ...], np.ndarray]
 
-    def beside(self, branch: int, sites: Sequence[int]) -> list[int]:
-        """Return the spare branches that are at a firm ``branch``."""
-        return self._at(branch, sites)
-
-    def held(self, sites: Sequence[int]) -> np.ndarray:
-        """Return which coordinates (d,) bool are not fitted where spare branches are at ``sites``.
-
-        A branch that is absent has none that are.
-        """
-        held = self.best.held.copy()
-        for branch in self._at(_ABSENT, sites):
-            held[[*_columns(self.best.problem.layout, branch).values()]] = True
-        return held
+    def beside(self, site: int, sites: Sequence[int]) -> list[int]:
+        """Return the spare branches that are at a ``site``, such as that of a firm branch."""
+        return [s for s, its in zip(self.spare, sites, strict=True) if its == site]
 
     def allowed(self, sites: Sequence[int]) -> float:
         """Return the rise of chi-square at which the ``sites`` are as good as the best fit.
@@ -142,17 +132,15 @@ class Valleys:
         problem = copy(self.best.problem)
         problem.layout = _cells(self, sites)
         x = self.points[tuple(sites)]
+        held = _held(self.best, self.beside(_ABSENT, sites))
         own = float(np.sum(problem.residuals(x) ** 2))
         chi2 = self.best.chi2 if own <= self.best.chi2 + self.best.threshold else own
-        return replace(self.best, problem=problem, x=x, held=self.held(sites), chi2=chi2)
-
-    def _at(self, site: int, sites: Sequence[int]) -> list[int]:
-        return [s for s, its in zip(self.spare, sites, strict=True) if its == site]
+        return replace(self.best, problem=problem, x=x, held=held, chi2=chi2)
 
     @property
     def absent(self) -> frozenset[int]:
         """Spare branches that need not be there."""
-        return frozenset(b for sites in self.points for b in self._at(_ABSENT, sites))
+        return frozenset(b for sites in self.points for b in self.beside(_ABSENT, sites))
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -216,6 +204,14 @@ def _columns(layout: FitLayout, branch: int) -> dict[tuple[str, int], int]:
     }
 
 
+def _held(best: Optimum, absent: Iterable[int]) -> np.ndarray:
+    """Return which coordinates (d,) bool are not fitted: none of an ``absent`` branch is."""
+    held = best.held.copy()
+    for branch in absent:
+        held[[*_columns(best.problem.layout, branch).values()]] = True
+    return held
+
+
 def _time(layout: FitLayout, branch: int) -> int:
     return _columns(layout, branch)["T", 0]
 
@@ -235,9 +231,8 @@ def valleys_of(best: Optimum, estimates: Sequence[Estimate]) -> Valleys | None:
     def followed(start: tuple[np.ndarray, tuple[int, ...]]) -> LocalFit:
         problem = copy(best.problem)  # counts its simulations on its own
         x, without = start
-        sites = [_ABSENT if b in without else _SLOW for b in spare]
         enough = _GAIN * best.threshold
-        return descend(problem, x, alone.held(sites), _ITERATIONS, enough, quick=False)
+        return descend(problem, x, _held(best, without), _ITERATIONS, enough, quick=False)
 
     starts: list[tuple[np.ndarray, tuple[int, ...]]] = [
         (start, ()) for branch in spare for start in _starts(alone, branch)
@@ -490,12 +485,12 @@ def sums_of_weak(
     """
     layout = best.problem.layout
     values, known = layout.values(best.x), {e.name: e for e in estimates}
-    told = {part for one in sums for part in _MODULUS.findall(one.name)}
+    summed = {part for one in sums for part in _MODULUS.findall(one.name)}
     groups: list[list[int]] = [[]]
     times = {q.index: values[j] for j, q in enumerate(layout.quantities) if q.kind == "T"}
     for branch in sorted(times, key=times.__getitem__):
         e = known.get(f"mu_{branch}")
-        if e is None or e.determined or not e.free or e.constraint or e.name in told:
+        if e is None or e.determined or not e.free or e.constraint or e.name in summed:
             groups.append([])
         else:
             groups[-1].append(branch)

@@ -160,7 +160,7 @@ def test_a_recording_without_a_rig_file_is_compared_with_the_rig_of_the_thesis(
 ) -> None:
     run, other = tmp_path / "run.h5", write(tmp_path / "other.toml", OTHER_RIG)
     done("record", write(tmp_path / "lobe.toml", LOBE), "--out", run)
-    told = original_of(run).differences("daqmx:Dev1", other, load_rig_file(other))
-    assert "another rig file: none, which is the thesis's rig; what differs:" in told[0]
-    assert "amplifier.gain_V_per_V: 1000 in the recording, 500 here" in told
-    assert "limits.voltage_max_kV: 8.5 in the recording, 4.9 here" in told
+    differing = original_of(run).differences("daqmx:Dev1", other, load_rig_file(other))
+    assert "another rig file: none, which is the thesis's rig; what differs:" in differing[0]
+    assert "amplifier.gain_V_per_V: 1000 in the recording, 500 here" in differing
+    assert "limits.voltage_max_kV: 8.5 in the recording, 4.9 here" in differing

@@ -82,7 +82,7 @@ class Content:
     """Content of the file at ``path``.
 
     ``proposals`` are by table, "" for all columns; ``table`` is the one that is taken, None where
-    the user must choose. ``told`` is the size of the specimen that the file's head tells.
+    the user must choose. ``stated`` is the size of the specimen by the file's head.
     """
 
     path: Path
@@ -90,7 +90,7 @@ class Content:
     proposals: Mapping[str, ColumnGuesses]
     table: str | None
     is_text: bool = False
-    told: Specimen = field(default_factory=Specimen)
+    stated: Specimen = field(default_factory=Specimen)
     block: tuple[str, ...] = ()
 
 
@@ -130,7 +130,7 @@ def content_of(
     block: Sequence[Sequence[str]] = getattr(source, "block", ())
     return Content(
         path, columns, proposals, _taken(source, scales, apart),
-        is_text=hasattr(source, "layout"), told=specimen_from_header(block),
+        is_text=hasattr(source, "layout"), stated=specimen_from_header(block),
         block=tuple(printable(" ".join(row)) for row in block if row),
     )  # fmt: skip
 

@@ -10,7 +10,7 @@ from dearig.model.readings.noise import LEAD_IN
 from dearig.model.verdict import is_rejected, p_text, smallest_p
 from dearig.report.text.numbers import seconds, significant, symbol, with_symbols
 from dearig.report.text.thesis import SIMULATED_CAVEAT
-from dearig.units import SHOWN
+from dearig.units import SHOWN, counted
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import (
@@ -79,13 +79,9 @@ def listed(names: Iterable[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _counted(count: int, one: str) -> str:
-    return f"{count:,} {one}{'' if count == 1 else 's'}"
-
-
 def _recordings(comparisons: Sequence[Comparison]) -> str:
     names = [c.name for c in comparisons]
-    head = _counted(len(names), "recording")
+    head = counted(len(names), "recording")
     return f"{head} ({listed(names)})" if len(names) <= _NAMES_MAX else head
 
 
@@ -94,7 +90,7 @@ def describe_model(model: Actuator | Strip) -> str:
     network = model.network
     kinds = sorted({s.kind for s in network.springs})
     springs = listed(map(spring_label, kinds))
-    text = f"{springs} springs with {_counted(len(network.branches), 'relaxation branch')}"
+    text = f"{springs} springs with {counted(len(network.branches), 'relaxation branch')}"
     text = text.replace("branchs", "branches")
     effects = [name for name, _ in model.effects]
     return f"{text}, and {listed(effects)}" if effects else text
@@ -107,8 +103,8 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
     free = sum(e.free for e in outcome.fit.estimates)
     said = [
         f"A model of the {'film' if outcome.kind == 'film' else 'actuator'} "
-        f"({describe_model(outcome.fit.model)}; {_counted(free, 'free parameter')}) was fitted to "
-        f"{_recordings(train)}, {_counted(samples, 'sample')} in all, by "
+        f"({describe_model(outcome.fit.model)}; {counted(free, 'free parameter')}) was fitted to "
+        f"{_recordings(train)}, {counted(samples, 'sample')} in all, by "
         f"{_METHODS.get(outcome.method, outcome.method)}. It took {seconds(outcome.seconds)}."
     ]
     said.append(f"On {_these(train)} its {_error(train)}")

@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.config.sequencefile import HEAD_FIELDS, SequenceFault
+from dearig.units import in_digits
 from dearig.window.documents.draft import Draft
 from dearig.window.documents.segment_forms import SegmentForms, sequence_forms
 from dearig.window.kit.fields import (
@@ -238,7 +239,7 @@ class SequenceEditor(QWidget):
         played = iter(durations)
         for row in range(len(self.draft.segments)):
             total = sum(next(played) for _ in range(self._repeats(row)))
-            self._set_duration(row, f"{total:.3g}" if total < 999.5 else f"{total:.0f}")
+            self._set_duration(row, in_digits(f"{total:.3g}"))
 
     def clear_duration(self, row: int | None) -> None:
         """Show no duration for the segment in ``row``, which cannot be played."""

@@ -192,7 +192,7 @@ class ImportDialog(QDialog):
         self.table_box.setCurrentIndex(max(self.table_box.findData(content.table), 0))
         for widget in (self.table_box, self.table_label):
             widget.setVisible(bool(tables))
-        self.fields.show_stated(content.told, content.is_text)
+        self.fields.show_stated(content.stated, content.is_text)
         if first:
             self._signature = self._proposal().signature
             kept = self._memory.recall(self._signature)

@@ -178,7 +178,7 @@ def test_the_content_has_guesses_with_their_doubts(tmp_path: Path) -> None:
         2: Guessed("displacement", "", "scale"),
         3: Guessed("voltage", "", "unit"),
     } | {n: g for n, g in found.proposals[""].guesses.items() if n == 4}
-    assert content_of(film(tmp_path)).told == Specimen(30.0, 18.0)
+    assert content_of(film(tmp_path)).stated == Specimen(30.0, 18.0)
     # the same names and units have the same signature, whatever the values
     other = tmp_path / "other.csv"
     other.write_text(path.read_text().replace("0.1", "0.15"))
