@@ -4,7 +4,6 @@ import subprocess
 from pathlib import Path
 
 from bootstrap import run, start
-from links import make
 
 __all__ = ["start_compiling"]
 
@@ -27,12 +26,10 @@ COLD = "import sys; from dearig.acquisition.warm_up import is_warm; sys.exit(not
 
 def start_compiling(python: Path) -> list[subprocess.Popen[bytes]]:
     """Start two processes that compile the kernels of runs and of fits, where there are none."""
-    # the project itself may still have to be installed
-    found = {"PYTHONPATH": str(make())}
-    if not run([str(python), "-c", COLD], **found):
+    if not run([str(python), "-c", COLD]):
         return []
     print("Compiling the numerical kernels, once for these sources ...", flush=True)
     # numba colours each message of an overload that it tries, though nobody reads them
-    found["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"
+    plain = {"NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
     commands = ([str(python), "-c", DEAF + QUICK + code] for code in (RUNS, FITS))
-    return [start(command, quiet=True, **found) for command in commands]
+    return [start(command, quiet=True, **plain) for command in commands]

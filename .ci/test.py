@@ -1,6 +1,5 @@
 """Run all tests from a fresh checkout; installs what they need first."""
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,9 +9,9 @@ from kernels import start_compiling
 
 def prepare_all(venv: Path) -> tuple[Path, int]:
     """Install what the tests need and compile the kernels; return the Python and an exit code."""
-    compiling: list[subprocess.Popen[bytes]] = []
+    python = prepare("test", venv)
+    compiling = start_compiling(python)
     try:
-        python = prepare("test", venv, lambda python: compiling.extend(start_compiling(python)))
         prepare_screen(python)
         if compiling:
             # a process that only collects leaves compiled modules to those that run
