@@ -163,7 +163,7 @@ def step_table(outcome: DiagnoseOutcome) -> Table:
 
 _VERDICTS = {
     "chosen": "chosen",
-    "indistinguishable": "not separable",
+    "indistinguishable": "nearly as good",
     "better": "less probable",
     "worthless": "no better than chance",
     "failed": "fit failed",

@@ -377,7 +377,7 @@ class TestTables:
         kept = ("sensor lag",)
         whole, brief = ranking_table(ROUND, kept), ranking_table(ROUND, kept, 3)
         assert len(whole.rows) == len(ROUND.candidates)
-        assert [r.cells[-1] for r in brief.rows] == ["chosen", "not separable", "less probable"]
+        assert [r.cells[-1] for r in brief.rows] == ["chosen", "nearly as good", "less probable"]
         assert "9 more candidates are worse" in brief.note
         assert whole.rows[0].detail == ROUND.candidates[0].note
         assert [r.mark for r in brief.rows] == [True, False, False]
@@ -401,7 +401,7 @@ class TestTables:
 
     def test_nothing_is_cut_off_at_80_columns(self):
         text = shown(diagnosis_tables(diagnose_outcome()), 80)
-        for words in ("Fitted parameters of sensor lag", "0.00910 to 0.00990", "not separable"):
+        for words in ("Fitted parameters of sensor lag", "0.00910 to 0.00990", "nearly as good"):
             assert words in text
 
 
