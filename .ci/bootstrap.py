@@ -53,7 +53,9 @@ def _install(python: Path, *what: str) -> None:
     tested = ["--quiet", "--constraint", str(CONSTRAINTS)]
     # most modules are never imported; Python compiles the others when they are
     by_pip = [*pip, "install", "--no-compile", *tested]
-    got = subprocess.run([*by_pip, "--only-binary", ":all:", "uv"], capture_output=True, check=False)
+    got = subprocess.run(
+        [*by_pip, "--only-binary", ":all:", "uv"], capture_output=True, check=False
+    )
     if got.returncode == 0:
         by_uv = [str(python), "-m", "uv", "pip", "install", "--python", str(python), *tested]
         done = subprocess.run([*by_uv, *what], env={**os.environ, **_index(pip)}, check=False)

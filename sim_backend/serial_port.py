@@ -70,7 +70,7 @@ class _Served:
         self._responder = responder
         self._clock = clock
         # select on Windows takes sockets only
-        self._told, self._tell = socket.socketpair()
+        self._woken, self._tell = socket.socketpair()
 
     def end(self) -> None:
         """Make the loop end. Any thread may call it."""
@@ -78,7 +78,7 @@ class _Served:
 
     def close(self) -> None:
         """Release the loop's resources, after it has ended."""
-        self._told.close()
+        self._woken.close()
         self._tell.close()
 
     def run(self) -> None:
@@ -89,8 +89,8 @@ class _Served:
         """Return the readable sources, none where a reply is due, or None to end the loop."""
         due = self._responder.next_due()
         seconds = _LONGEST_WAIT if due is None else max(0.0, due - self._clock.now())
-        ready, _, _ = select.select([self._told, *sources], [], [], seconds)
-        return None if self._told in ready else ready
+        ready, _, _ = select.select([self._woken, *sources], [], [], seconds)
+        return None if self._woken in ready else ready
 
 
 class _Calls(_Served):

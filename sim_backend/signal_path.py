@@ -127,8 +127,8 @@ class SignalPath:
         voltage = self._amplifier.outputs(rows, at, into)
         if electricity.shown is not None:
             shown, part = electricity.shown[:, at], into / self._spacing
-            beside = shown[0] * (1.0 - part) + shown[1] * part - held[at]
-            voltage += np.where(dead, 0.0, beside)
+            difference = shown[0] * (1.0 - part) + shown[1] * part - held[at]
+            voltage += np.where(dead, 0.0, difference)
         voltage[self._active(first, samples, FaultKind.MONITOR_WIRE_OFF)] = 0.0
         counts = np.empty((len(self._names), samples), dtype=np.int16)
         counts[0] = command

@@ -166,7 +166,7 @@ class FeedbackLoop:
         self._taken = 0  # samples answered
         self._rest_sum, self._rest_samples = 0.0, 0
         self._state = ""
-        self._told: dict[str, int] = {}  # sample of the last event about each state
+        self._reported: dict[str, int] = {}  # sample of the last event about each state
         self._answers = 0
         self._least = math.inf  # samples that waited for output
         self._lowest = self._highest = 0.0
@@ -284,10 +284,10 @@ class FeedbackLoop:
         before, self._state = self._state, answer.state
         if answer.state == before:
             return []
-        told = self._told.get(answer.state)
-        if told is not None and start - told < _TELL_AGAIN * self._rate:
+        reported = self._reported.get(answer.state)
+        if reported is not None and start - reported < _TELL_AGAIN * self._rate:
             return []
-        self._told[answer.state] = start
+        self._reported[answer.state] = start
         level, words = _STATES[answer.state]
         correction = f"{answer.correction:+.2%}"
         held = f"{self.feedback.setpoint * 1e3:.6g} mm"

@@ -76,7 +76,7 @@ def serve(
     address: str,
     rig_file: RigFile,
     *,
-    told: Callable[[Serving], None],
+    announce: Callable[[Serving], None],
     host: str = "127.0.0.1",
     port: int = 0,
     anywhere: bool = False,
@@ -92,7 +92,7 @@ def serve(
 ) -> None:
     """Serve the card of the simulated rig at ``address`` until ctrl-C.
 
-    ``told`` is called with a ``Serving`` once it listens. ``anywhere`` allows a ``host`` that
+    ``announce`` is called with a ``Serving`` once it listens. ``anywhere`` allows a ``host`` that
     other computers can reach; all files of ``tls`` must then be given. A client may be silent with
     a voltage at the film for ``client_timeout`` s, without limit if None, and its link may be dead
     for ``link_timeout`` s. With ``sine`` the card's inputs read a sine within their limits, as
@@ -134,7 +134,7 @@ def serve(
             named = f"[{host}]" if ":" in host else host
             rig = f"daqmx:{device.name}@{named}:{found}"
             with _controller(rig_file, device, plan) if laser else nullcontext("") as serial_port:
-                told(Serving(host, found, rig, serial_port, _security(certificates)))
+                announce(Serving(host, found, rig, serial_port, _security(certificates)))
                 waiting = threading.Event()
                 while not interrupts.asked():
                     waiting.wait(_POLL_S)

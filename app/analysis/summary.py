@@ -404,12 +404,12 @@ def differences(paths: Sequence[Path], progress: Progress = quiet) -> tuple[Diff
 
     Raises ``InputError`` where one cannot be read.
     """
-    told: list[dict[tuple[str, str], str]] = []
+    stated: list[dict[tuple[str, str], str]] = []
     for i, path in enumerate(paths):
-        told.append(_conditions(open_recording(path)))
+        stated.append(_conditions(open_recording(path)))
         progress(path.stem, (i + 1) / len(paths))
-    names = dict.fromkeys(name for conditions in told for name in conditions)
-    rows = [Difference(*name, tuple(c.get(name, "") for c in told)) for name in names]
+    names = dict.fromkeys(name for conditions in stated for name in conditions)
+    rows = [Difference(*name, tuple(c.get(name, "") for c in stated)) for name in names]
     rows.sort(key=lambda row: GROUPS.index(row.group))
     return tuple(row for row in rows if len(set(row.values)) > 1)
 

@@ -56,7 +56,7 @@ class Explained:
     fit: LinearFit
     relative: bool
 
-    def told(self, value: float) -> float:
+    def in_unit(self, value: float) -> float:
         """Return a difference of the model in percent, or in the number's unit."""
         # a slope per day of runs within minutes may be beyond all numbers
         return 100.0 * math.expm1(min(value, _EXPONENT_MAX)) if self.relative else value

@@ -70,12 +70,12 @@ class OtherVersion(Exception):  # noqa: N818  (what was found)
 class Subject:
     """A recording of a study: its name in the table, its file, and what is known about it.
 
-    ``beside`` are columns of the run of a campaign: its name and its settings.
+    ``labels`` are columns of the run of a campaign: its name and its settings.
     """
 
     name: str
     path: Path
-    beside: Mapping[str, Any] = field(default_factory=dict)
+    labels: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -48,12 +48,12 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Next
             found.append(NextExperiment(kind, (label,), f"{kind.capitalize()} the {label}: {why}"))
     for column in design.columns:
         low, high = column.range
-        if high - low < column.hardly:
+        if high - low < column.least_range:
             found.append(
                 NextExperiment(
                     "vary",
                     (column.label,),
-                    f"Vary the {column.label} by {column.hardly:g} {column.unit} and more: it was "
+                    f"Vary the {column.label} by {column.least_range:g} {column.unit} and more: it was "
                     f"within {low:.4g} and {high:.4g} {column.unit}.",
                 )
             )
@@ -72,7 +72,7 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Next
             NextExperiment(
                 "films",
                 ("film",),
-                f"Measure more films: with {films}, the scatter between films is hardly known; "
+                f"Measure more films: with {films}, the scatter between films is poorly known; "
                 f"{_FILMS_MIN} or more tell a common effect from one film's own.",
             )
         )

@@ -255,12 +255,12 @@ def await_notifications() -> None:
     """Wait for the notifications under way, within their time limits; ctrl-C ends the wait."""
     # a command that was killed takes a moment to end
     end = max((limit for _, limit in _under_way), default=0.0) + 1.0
-    told = False
+    reported = False
     with contextlib.suppress(KeyboardInterrupt):
         for thread, _ in _under_way:
             thread.join(1.0)
-            if thread.is_alive() and not told:
-                told = True
+            if thread.is_alive() and not reported:
+                reported = True
                 log.warning(
                     "waiting for notifications, %g s at most; ctrl-C ends the wait",
                     end - time.monotonic(),

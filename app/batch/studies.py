@@ -104,7 +104,7 @@ def _in_folder(folder: Path, before: str, out: Path) -> Iterator[Subject]:
         path = folder / name
         if path.resolve().is_relative_to(inside):
             continue
-        beside: dict[str, Any] = {}
+        labels: dict[str, Any] = {}
         parent = path.parent
         if (parent / JOURNAL).exists():
             key = str(parent)
@@ -115,8 +115,8 @@ def _in_folder(folder: Path, before: str, out: Path) -> Iterator[Subject]:
             if run is not None and run.warm_up:
                 continue
             if run is not None:
-                beside = {"run": run.name, **{f"set {n}": v for n, v in run.settings.items()}}
-        yield Subject(f"{before}{name}", path, beside)
+                labels = {"run": run.name, **{f"set {n}": v for n, v in run.settings.items()}}
+        yield Subject(f"{before}{name}", path, labels)
 
 
 def _listed(path: Path) -> Iterator[Subject]:
@@ -249,8 +249,8 @@ def _table(
     cached: int,
     moved: str,
 ) -> StudyTable:
-    """Write the rows, sorted by start time, with the columns ``beside`` of their subjects."""
-    made = [{**rows[s.name], **s.beside} for s in subjects]
+    """Write the rows, sorted by start time, with the columns ``labels`` of their subjects."""
+    made = [{**rows[s.name], **s.labels} for s in subjects]
     made.sort(key=lambda row: (str(row.get("started", "")), row["recording"]))
     table = out / "study.csv"
     write_csv(made, table)

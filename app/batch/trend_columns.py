@@ -51,13 +51,13 @@ _TIMES = (("days", "day", 1.0), ("hours", "h", 24.0), ("minutes", "min", 1440.0)
 class Covariate:
     """A column that may change the numbers: ``values`` (n,) of all rows, NaN where not known.
 
-    Slopes are given per ``unit``. A range smaller than ``hardly`` counts as hardly varied.
+    Slopes are given per ``unit``. A range smaller than ``least_range`` counts as not varied.
     """
 
     label: str
     unit: str
     values: np.ndarray
-    hardly: float = 0.0
+    least_range: float = 0.0
 
     @property
     def range(self) -> tuple[float, float]:

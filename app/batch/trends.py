@@ -183,23 +183,23 @@ def find_trends(
     films = films_in(good)
     columns = columns_in(good, films, against)
     found: list[Trend] = []
-    told: list[str] = []
+    reasons: list[str] = []
     for i, name in enumerate(names):
         progress("trends", i / len(names))
-        trend = _trend(good, films, columns, name, told)
+        trend = _trend(good, films, columns, name, reasons)
         if trend is not None:
             found.append(trend)
     progress("trends", 1.0)
     if not found:
         raise InputError(
-            f"{source}: no trend can be computed. {' '.join(dict.fromkeys(told))}".rstrip()
+            f"{source}: no trend can be computed. {' '.join(dict.fromkeys(reasons))}".rstrip()
         )
     each = _sidak(sum(len(trend.design.columns) for trend in found))
     found = _judged([_with_effects(trend, each) for trend in found])
     every = np.ones(len(good), dtype=bool)
     return Trends(
         tuple(good), tuple(films), len(rows) - len(good), tuple(found),
-        tuple(dict.fromkeys(told)), proposals(design_of(columns, every), found, len(set(films))),
+        tuple(dict.fromkeys(reasons)), proposals(design_of(columns, every), found, len(set(films))),
         days_of_films(good, films),
     )  # fmt: skip
 
@@ -209,39 +209,39 @@ def _trend(
     films: Sequence[str],
     columns: Sequence[Covariate],
     name: str,
-    told: list[str],
+    reasons: list[str],
 ) -> Trend | None:
     """Return the trend of one number, without its effects.
 
-    Where there is none, ``told`` receives the reason.
+    Where there is none, ``reasons`` receives the reason.
     """
     at = np.array([i for i, row in enumerate(rows) if _is_known(row, name)], dtype=int)
     if at.size < 2 + FREEDOM_MIN:  # intercept and one slope
-        told.append(f"{name}: {at.size} runs have a value that their data determine.")
+        reasons.append(f"{name}: {at.size} runs have a value that their data determine.")
         return None
     used = np.zeros(len(rows), dtype=bool)
     used[at] = True
     design = design_of(columns, used)
     if not design.columns:
-        told.extend(design.left_out)
+        reasons.extend(design.left_out)
         return None
     whole = np.all([np.isfinite(column.values[at]) for column in design.columns], axis=0)
     if not whole.all():
-        told.append(f"{name}: {int((~whole).sum())} runs lack a value of a column.")
+        reasons.append(f"{name}: {int((~whole).sum())} runs lack a value of a column.")
         at = at[whole]
         used[:] = False
         used[at] = True
         design = design_of(columns, used)
     if not design.columns or at.size < 1 + len(design.columns) + FREEDOM_MIN:
-        told.append(f"{name}: {at.size} runs are too few for {len(design.columns)} columns.")
+        reasons.append(f"{name}: {at.size} runs are too few for {len(design.columns)} columns.")
         return None
-    told.extend(design.left_out)
+    reasons.extend(design.left_out)
     values, low, high = (
         np.array([float(rows[i][name] if end is None else end(rows[i], name)) for i in at])
         for end in (None, _low, _high)
     )
     if float(np.ptp(values)) <= 1e-9 * float(np.max(np.abs(values))):
-        told.append(f"{name}: the same in all runs: it was given, not measured.")
+        reasons.append(f"{name}: the same in all runs: it was given, not measured.")
         return None
     relative = bool((values > 0.0).all() and (low > 0.0).all())
     y, ends = (np.log(values), np.log([low, high])) if relative else (values, np.array([low, high]))
@@ -300,7 +300,7 @@ def _effect(model: Explained, column: Covariate, i: int, each: float) -> TrendSl
 
     ``each`` is the confidence of its simultaneous interval.
     """
-    sample, fit, told = model.sample, model.fit, model.told
+    sample, fit, in_unit = model.sample, model.fit, model.in_unit
     p_equal = slopes_differ(sample, fit.variances, i) if sample.films > 1 else None
     places = model.slopes_of(i)
     verdict = "common" if sample.films > 1 else "untold"
@@ -315,7 +315,7 @@ def _effect(model: Explained, column: Covariate, i: int, each: float) -> TrendSl
     own = tuple(_own_slope(model, i, place) for place in places)
     wide = fit.interval(i, each)
     return TrendSlope(
-        column, told(slope), told(low), told(high), (told(wide[0]), told(wide[1])),
+        column, in_unit(slope), in_unit(low), in_unit(high), (in_unit(wide[0]), in_unit(wide[1])),
         float(fit.p_values[i]), p_equal, verdict, own,
     )  # fmt: skip
 
@@ -327,8 +327,8 @@ def _own_slope(model: Explained, i: int, place: int) -> FilmSlope:
     slope = float(fit.slopes[i] + fit.slopes[place])
     half = fit.quantile(place) * math.sqrt(max(float(fit.covariance[np.ix_(at, at)].sum()), 0.0))
     film = model.films[model.extras[place - model.columns].film]
-    told = model.told
-    return FilmSlope(film, told(slope), told(slope - half), told(slope + half))
+    in_unit = model.in_unit
+    return FilmSlope(film, in_unit(slope), in_unit(slope - half), in_unit(slope + half))
 
 
 def _judged(trends: Sequence[Trend]) -> list[Trend]:
@@ -373,7 +373,7 @@ def _changes(
             ChangePoint(
                 model.films[extra.film], str(rows[before]["recording"]),
                 str(rows[after]["recording"]), str(rows[after].get("started") or ""),
-                model.told(size), model.told(low), model.told(high), after,
+                model.in_unit(size), model.in_unit(low), model.in_unit(high), after,
             )
         )  # fmt: skip
     return sorted(found, key=lambda change: change.row)

@@ -173,18 +173,18 @@ def _live(console: Console, progress: Progress) -> tuple[RunObserver, Callable[[
     from dearig.acquisition.run import RunObserver
 
     stage = "holding"
-    told = 0.0
+    printed = 0.0
 
     class Live(RunObserver):
         def answered(self, time: float, answer: HoldAnswer) -> None:
-            nonlocal stage, told
+            nonlocal stage, printed
             error = (
                 "no reading" if answer.error != answer.error else f"{answer.error * 1e6:+.1f} um"
             )
             said = f"error {error}, correction {answer.correction:+.2%}"
             stage = f"{said} ({answer.state})" if answer.state != "holding" else said
-            if time - told >= _TELL_EVERY and not console.is_terminal:
-                told = time
+            if time - printed >= _TELL_EVERY and not console.is_terminal:
+                printed = time
                 print_line(console, f"{time / 60.0:.0f} min: {stage}")
 
     def shown(name: str, fraction: float) -> None:

@@ -99,8 +99,8 @@ class _Terminal(logging.StreamHandler[TextIO]):
 
     def filter(self, record: logging.LogRecord) -> bool:
         # tracebacks, and Python's warnings of libraries, are for the log file
-        told = record.exc_info is None and record.name != "py.warnings"
-        wanted = told or self.level < logging.WARNING
+        reported = record.exc_info is None and record.name != "py.warnings"
+        wanted = reported or self.level < logging.WARNING
         return wanted and bool(super().filter(record))
 
 

@@ -144,9 +144,9 @@ def record(
         provenance |= {"repeats": f"{like}"}
     if seed is None:
         seed = original.seed if original is not None and simulated else 0
-    told: tuple[str, ...] = ()
+    differing: tuple[str, ...] = ()
     if original is not None and not simulated:
-        told = original.differences(rig, rig_file, settings)
+        differing = original.differences(rig, rig_file, settings)
     actuator = None
     if model is not None:
         if original is not None and rig != "sim":
@@ -173,7 +173,7 @@ def record(
         def play() -> RunResult:
             return run(
                 loaded, rig, settings, out, options, overlay=overlaid, progress=progress,
-                observer=_announcer(console, settings, provenance[SOURCE], told),
+                observer=_announcer(console, settings, provenance[SOURCE], differing),
             )  # fmt: skip
 
         result = notifier.tell_of(out, play)
@@ -392,7 +392,7 @@ def serve_daqmx(
     settings = load_rig_file(rig_file)
     announce_compilation()
     serve(
-        rig, settings, told=_announce, host=host, port=port, anywhere=anywhere,
+        rig, settings, announce=_announce, host=host, port=port, anywhere=anywhere,
         tls=TlsFiles(tls_cert, tls_key, tls_client_ca),
         paced=paced, faults=fault or (),
         client_timeout=client_timeout if client_tracking else None, link_timeout=link_timeout,

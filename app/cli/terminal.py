@@ -248,7 +248,7 @@ class _Fitted:
             if isinstance(piece, Table):
                 yield from _laid_out(piece, show, width)
                 continue
-            joined = piece[0].beside(_in_per_cent(piece[1]))
+            joined = piece[0].with_columns_of(_in_per_cent(piece[1]))
             if _width(joined, show) <= width:
                 yield from _laid_out(joined, show, width)
             else:

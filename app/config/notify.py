@@ -60,11 +60,11 @@ class Notify:
 
 def notify_text(notify: Notify) -> str:
     """Return a sentence on what ``notify`` starts and whom it tells, "" for nothing."""
-    told = [
+    means = [
         *([f"starts {shlex.join(notify.command)}"] if notify.command else []),
         *([f"posts to {redacted(notify.webhook)}"] if notify.webhook else []),
     ]
-    return f"at {', '.join(notify.on)} this {' and '.join(told)}" if told else ""
+    return f"at {', '.join(notify.on)} this {' and '.join(means)}" if means else ""
 
 
 class NotifyTable(TomlTable):

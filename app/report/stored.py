@@ -80,7 +80,7 @@ def restored(text: str, name: str) -> StoredReport:
             _value(_KINDS[o["kind"]], o["value"], arrays) for o in document["outcomes"]
         )
         if not outcomes:
-            raise ValueError("no result")  # noqa: TRY301  (it is told as all others are)
+            raise ValueError("no result")  # noqa: TRY301  (it is reported as all others are)
         return StoredReport(outcomes, _value(Made, document["made"], []))
     except InputError:
         raise

@@ -167,7 +167,7 @@ class _Curves:
         return found
 
     def comparison(self, value: Comparison) -> dict[str, Any]:
-        told = self.plain(
+        stored = self.plain(
             value,
             "errors",
             "published",
@@ -179,7 +179,7 @@ class _Curves:
             "band",
         )
         # not every number is finite, and JSON has only finite ones
-        return told | {
+        return stored | {
             "errors": self.put(np.array([float(x) for x in asdict(value.errors).values()])),
             "curves": [self.plain(curve) for curve in value.curves],
         }
@@ -198,38 +198,38 @@ class _Curves:
 
 
 def _view(folder: Path, words: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> StudyView:
-    def made(cls: Callable[..., Any], told: Mapping[str, Any], *names: str) -> Any:
-        return cls(**{k: arrays[v] if k in names else v for k, v in told.items()})
+    def made(cls: Callable[..., Any], stored: Mapping[str, Any], *names: str) -> Any:
+        return cls(**{k: arrays[v] if k in names else v for k, v in stored.items()})
 
-    def comparison(told: Mapping[str, Any]) -> Comparison:
-        numbers = dict(zip(_MEASURES, arrays[told["errors"]].tolist(), strict=True))
+    def comparison(stored: Mapping[str, Any]) -> Comparison:
+        numbers = dict(zip(_MEASURES, arrays[stored["errors"]].tolist(), strict=True))
         samples = int(numbers.pop("samples"))
         curves = tuple(
-            made(ChannelCurve, c, "time", "measured", "predicted") for c in told.get("curves", ())
+            made(ChannelCurve, c, "time", "measured", "predicted") for c in stored.get("curves", ())
         )
-        parts = {**told, "errors": Errors(**numbers, samples=samples), "curves": curves}
+        parts = {**stored, "errors": Errors(**numbers, samples=samples), "curves": curves}
         found: Comparison = made(Comparison, parts, "time", "drive", "measured", "model")
         return found
 
-    def pair(told: Mapping[str, Any]) -> Pair:
-        after = told["after"]
-        return comparison(told["before"]), None if after is None else comparison(after)
+    def pair(stored: Mapping[str, Any]) -> Pair:
+        after = stored["after"]
+        return comparison(stored["before"]), None if after is None else comparison(after)
 
-    def residual(told: Mapping[str, Any]) -> Residual:
+    def residual(stored: Mapping[str, Any]) -> Residual:
         parts = {
-            "over_time": tuple(made(Trace, t, "x", "y") for t in told["over_time"]),
-            "density": tuple(made(Trace, t, "x", "y") for t in told["density"]),
+            "over_time": tuple(made(Trace, t, "x", "y") for t in stored["over_time"]),
+            "density": tuple(made(Trace, t, "x", "y") for t in stored["density"]),
             "dependences": tuple(
                 tuple(made(Dependence, d, "at", "loading", "unloading", "error") for d in group)
-                for group in told["dependences"]
+                for group in stored["dependences"]
             ),
             "missing": tuple(
                 made(MissingStress, m, "time", "stress", "stretch", "rate", "voltage")
-                for m in told["missing"]
+                for m in stored["missing"]
             ),
-            "words": tuple(told["words"]),
+            "words": tuple(stored["words"]),
         }
-        return Residual(**{**told, **parts})
+        return Residual(**{**stored, **parts})
 
     return StudyView(
         folder=folder,
@@ -249,14 +249,14 @@ def _view(folder: Path, words: Mapping[str, Any], arrays: Mapping[str, np.ndarra
     )
 
 
-def _pieces(told: list[Any]) -> Pieces:
-    return tuple(piece if isinstance(piece, str) else _table(piece) for piece in told)
+def _pieces(stored: list[Any]) -> Pieces:
+    return tuple(piece if isinstance(piece, str) else _table(piece) for piece in stored)
 
 
-def _table(told: Mapping[str, Any]) -> Table:
+def _table(stored: Mapping[str, Any]) -> Table:
     return Table(
-        told["title"],
-        tuple((name, unit) for name, unit in told["head"]),
-        tuple(Row(tuple(r["cells"]), r["detail"], r["muted"], r["mark"]) for r in told["rows"]),
-        told["note"],
+        stored["title"],
+        tuple((name, unit) for name, unit in stored["head"]),
+        tuple(Row(tuple(r["cells"]), r["detail"], r["muted"], r["mark"]) for r in stored["rows"]),
+        stored["note"],
     )

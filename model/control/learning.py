@@ -346,7 +346,7 @@ class Learner:
             left = self._left(before, run.left)
             band = self._frequency <= learned
             if np.isnan(left[band]).all():
-                return learned, float("nan")  # the error is noise: nothing more can be told
+                return learned, float("nan")  # the error is noise: nothing more can be detected
             left = np.nan_to_num(left)
             beyond = left[band][-1] * np.maximum(self._frequency / learned, 1.0) ** 2
             off = np.where(band, left, np.minimum(off, beyond))
@@ -367,9 +367,9 @@ class Learner:
         """Return the part (M,) of an error that is left, from amplitudes; NaN where it is noise."""
         noise = self._noise_around(int(np.count_nonzero(self.first.reachable)))
         had, left = self._around(before), self._around(after)
-        told = np.maximum(had, left) > self._settings.told * noise
+        detected = np.maximum(had, left) > self._settings.detected * noise
         part = np.sqrt(np.maximum(left - noise, 0.0) / np.maximum(had, noise))
-        return np.where(told, part, np.nan)
+        return np.where(detected, part, np.nan)
 
     def _off_by_prediction(self, lacking: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return W (M,) from what the model ``lacking`` (N,) m shows in a run, and where it does.
@@ -382,7 +382,7 @@ class Learner:
         )
         expected = self._ratio * moved
         shown, predicted = self._around(np.abs(more + moved - expected)), self._around(expected)
-        clear = np.flatnonzero(predicted > self._settings.told * noise)
+        clear = np.flatnonzero(predicted > self._settings.detected * noise)
         if clear.size == 0:
             return np.full(shown.size, np.inf), np.zeros(shown.size, dtype=bool)
         ratio = np.sqrt(np.maximum(shown - noise, 0.0)[clear] / predicted[clear])
@@ -416,16 +416,16 @@ class Learner:
 
         power = around(np.abs(moved) ** 2)
         noise = self._noise**2 * np.count_nonzero(self._inside) * (high - low)
-        told = np.flatnonzero(power > settings.clear * noise)
-        if told.size == 0:
+        detected = np.flatnonzero(power > settings.clear * noise)
+        if detected.size == 0:
             return np.ones(moved.size, dtype=complex), 1
-        ratio = (around((moved + more) * np.conj(moved)) / np.maximum(power, noise))[told]
+        ratio = (around((moved + more) * np.conj(moved)) / np.maximum(power, noise))[detected]
         size = np.clip(np.abs(ratio[0]), 1.0 / settings.ratio_max, settings.ratio_max)
         most = np.radians(settings.phase_max_deg)
         ratio[0] = size * np.exp(1j * np.clip(np.angle(ratio[0]), -most, most))
-        whole = np.interp(lines, told, ratio.real) + 1j * np.interp(lines, told, ratio.imag)
+        whole = np.interp(lines, detected, ratio.real) + 1j * np.interp(lines, detected, ratio.imag)
         whole[0] = abs(whole[0])
-        return whole, max(int(told[-1]), 1)
+        return whole, max(int(detected[-1]), 1)
 
     def _beyond_noise(self, change: np.ndarray) -> np.ndarray:
         """Return the part (M,) of the power of ``change`` (N,) m that is not noise (Wiener)."""

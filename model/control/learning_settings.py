@@ -81,7 +81,7 @@ class LearningSettings:
     jump_apart: int = 4
 
     @property
-    def told(self) -> float:
+    def detected(self) -> float:
         """Power over that of the noise from which a band tells something."""
         return self.significant**2
 

@@ -1,4 +1,4 @@
-"""The displacement that a film shall follow, with the limits of the voltage."""
+"""The displacement that a film is to follow, with the limits of the voltage."""
 
 from __future__ import annotations
 

@@ -527,7 +527,7 @@ def _why_none(race: Race, found: SearchResult) -> str:
     judge, parent = found.judge, race.parent
     worth = [f for f in race.fits if judge.gain(parent, f) > judge.settings.odds]
     if not worth:
-        return "no effect is worth its parameters"
+        return "no effect gains more than its parameters cost"
     leading = judge.ranked(worth)[0]
     kept = sorted(_label(m, found.best) for m in found.best.members - parent.members)
     if kept and judge.gain(leading, found.best) > 0.0:

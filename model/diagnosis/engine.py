@@ -213,17 +213,17 @@ class Search:
         if drifting is None or judge.gain(baseline, drifting) < self.settings.odds:
             return self._grown(baseline, first)
         if drifting.cost < self.settings.share * first[0].cost:
-            beside = self._grown(drifting, None)
-            if judge.is_settled(beside):
-                return beside
+            drifted = self._grown(drifting, None)
+            if judge.is_settled(drifted):
+                return drifted
             lawful = self._grown(baseline, first)
         else:
             lawful = self._grown(baseline, first)
             if judge.is_settled(lawful):
                 return lawful
-            beside = self._grown(drifting, None)
-        judge.see([lawful, beside])
-        return min(lawful, beside, key=judge.criterion)
+            drifted = self._grown(drifting, None)
+        judge.see([lawful, drifted])
+        return min(lawful, drifted, key=judge.criterion)
 
     def _with_interference_at_rest(self, baseline: Fit) -> Fit:
         """Return ``baseline`` with interference where the readings at rest have a line.
@@ -412,10 +412,10 @@ class Search:
 
     def _regression(self, parent: Fit) -> tuple[Regression, Extent]:
         fitter, records = self.fitter, self.fitter.records
-        went: np.ndarray | None = None
+        mean_drift_m: np.ndarray | None = None
         if parent.drift:
             noise = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
-            went = parent.mean_drift() * noise
+            mean_drift_m = parent.mean_drift() * noise
         plain = JointProblem.alone(fitter.problem(parent.model))
         residuals = -parent.plain_residuals()
         regression = Regression(
@@ -424,7 +424,7 @@ class Search:
             fitter.times,
             self.settings,
             parent.drift,
-            went,
+            mean_drift_m,
             (plain.jacobian(parent.x, ~parent.fixed, residuals), residuals),
         )
         longest = int(np.argmax([r.measured.size for r in records]))

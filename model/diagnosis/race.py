@@ -93,20 +93,23 @@ def _entered(fitter: Fitter, parent: Fit, candidate: RaceEntry, iterations: int)
     name = candidate.effect
     model = with_effect(parent.model, name, typical_values(EFFECTS[name]))
     problem = fitter.problem(model, parent.drift, kernel.ROUGH)
-    anew, beside = [], []
+    refitted, shifted_starts = [], []
     for start in candidate.starts:
         springs = fitter.with_springs(parent, start.moduli, start.times)
-        anew.append(fitter.start_of(problem, springs, start.values))
+        refitted.append(fitter.start_of(problem, springs, start.values))
         shifted = parent.x.copy()
         if start.shift.size:
             shifted[~parent.fixed] += start.shift
-        beside.append(fitter.start_of(problem, shifted, start.shifted))
+        shifted_starts.append(fitter.start_of(problem, shifted, start.shifted))
     # and from nothing, in the best shape
     nothing = near_neutral(name, candidate.starts[0].values)
-    beside.append(fitter.start_of(problem, parent.x, nothing))
-    costs = fitter.costs(problem, np.array(anew + beside))
-    chosen = (int(np.argmin(costs[: len(anew)])), len(anew) + int(np.argmin(costs[len(anew) :])))
-    rows = anew + beside
+    shifted_starts.append(fitter.start_of(problem, parent.x, nothing))
+    costs = fitter.costs(problem, np.array(refitted + shifted_starts))
+    chosen = (
+        int(np.argmin(costs[: len(refitted)])),
+        len(refitted) + int(np.argmin(costs[len(refitted) :])),
+    )
+    rows = refitted + shifted_starts
     return [fitter.descend(problem, rows[i], iterations) for i in chosen]
 
 

@@ -108,7 +108,7 @@ class Regression:
     """The regression of ``records`` about a fitted ``model``, whose effects stay as they are.
 
     ``times`` is the range of relaxation times in s, ``drift`` the variance of the records' drift in
-    units of a reading's noise; the most probable drift ``went`` (N,) in m is subtracted. ``local``
+    units of a reading's noise; the most probable drift ``mean_drift_m`` (N,) in m is subtracted. ``local``
     are the derivative (N, f) of the model's readings with respect to its free coordinates, and its
     residuals (N,), model less measured, both over the noise: by them the parent's springs follow an
     effect that is small (a Gauss-Newton step).
@@ -121,14 +121,14 @@ class Regression:
         times: tuple[float, float],
         settings: DiagnosisSettings,
         drift: float = 0.0,
-        went: np.ndarray | None = None,
+        mean_drift_m: np.ndarray | None = None,
         local: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
         self.model, self.settings = model, settings
         count = int(math.log(times[1] / times[0]) / math.log(settings.grid_ratio)) + 2
         self.grid = np.geomspace(*times, count)
         self._springs = springs_of_grid(model, self.grid)
-        self._displacements = _clean(records, model, settings, went)
+        self._displacements = _clean(records, model, settings, mean_drift_m)
         self._records = tuple(records)
         self._linear: dict[str, bool] = {}
         self._imposed = self._impose(model)
@@ -475,7 +475,7 @@ def _clean(
     records: Sequence[Record],
     model: Actuator | Strip,
     settings: DiagnosisSettings,
-    went: np.ndarray | None,
+    mean_drift_m: np.ndarray | None,
 ) -> list[np.ndarray]:
     """Return the displacement (N,) in m of each record, less drift and sensor effects."""
     found = []
@@ -484,7 +484,7 @@ def _clean(
         if isinstance(record, FilmRecord) or isinstance(model, Strip):
             found.append(np.zeros(0))
             continue
-        if went is not None:
-            record = replace(record, displacement=record.displacement - went[a:b])
+        if mean_drift_m is not None:
+            record = replace(record, displacement=record.displacement - mean_drift_m[a:b])
         found.append(without_sensor(record, model, settings.smoothing_s))
     return found

@@ -76,7 +76,7 @@ _CORRECTIONS_MAX = 5  # of the means; each leaves some hundredths of the distanc
 # by a quarter of a per cent
 _WIDTH_ERROR_MAX = 0.01
 # Of a prior's variance, by which the data must narrow it to say anything of it
-_PRIOR_TOLD = 1e-6
+_PRIOR_INFORMED = 1e-6
 # Of the rise of chi-square at the ends of linear intervals, which they may change
 _RISE_ERROR_MAX = 0.05
 # Hz and fidelity of the means for the intervals, the cheapest first
@@ -334,9 +334,13 @@ def _prior_p(problem: Problem, fit: LocalFit, held_limits: Sequence[str]) -> flo
     weighed = np.vstack([jac[: left.size] / math.sqrt(inflation), below])
     rest = np.eye(places.size) - below @ covariance(weighed.T @ weighed, 1.0) @ below.T
     size, axes = np.linalg.eigh(rest)
-    told = size > _PRIOR_TOLD
-    far = (axes.T @ rows)[told] ** 2 / size[told]
-    return float(scipy.special.chdtrc(int(told.sum()), float(far.sum()))) if told.any() else 1.0
+    informed = size > _PRIOR_INFORMED
+    far = (axes.T @ rows)[informed] ** 2 / size[informed]
+    return (
+        float(scipy.special.chdtrc(int(informed.sum()), float(far.sum())))
+        if informed.any()
+        else 1.0
+    )
 
 
 def _farthest(layout: FitLayout, rows: np.ndarray) -> str:

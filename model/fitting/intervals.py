@@ -392,7 +392,7 @@ def profile(
                 quick=True,
                 straight=True,
                 known=residuals,
-                beside=own,
+                also=own,
             )
             if chi2 - fit.cost * problem.samples > gain:
                 raise BetterPoint(fit.x, chi2 - fit.cost * problem.samples)
@@ -408,7 +408,11 @@ def profile(
                     break
                 slope = (z - z_inside) / step_before
                 inside, z_inside = point, z
-                column = np.zeros(fit.residuals.size) if fit.beside is None else fit.beside[:, 0]
+                column = (
+                    np.zeros(fit.residuals.size)
+                    if fit.also_columns is None
+                    else fit.also_columns[:, 0]
+                )
                 path = _path(problem, fit.x, fit.residuals, fit.jacobian, column, others, index)
                 step = (1.0 - z) / slope if slope > 0.0 else reach[index]
                 step = min(step, 4.0 * step_before, reach[index])

@@ -29,7 +29,7 @@ class LocalFit:
 
     ``jacobian`` (N, f) over the free coordinates is that of the last iteration, at ``x`` or one
     step before. ``to_gain`` is what the quadratic model at ``x`` would still take off chi-square, 0
-    where there is none at ``x``. ``beside`` (N, b) are the columns of other parameters where
+    where there is none at ``x``. ``also_columns`` (N, b) are the columns of other parameters where
     ``jacobian`` is, as far as they were asked for. ``starts`` are those of the global search that
     led here, best first: the cost that each reached, and whether it was followed to its end.
     """
@@ -41,7 +41,7 @@ class LocalFit:
     iterations: int
     converged: bool
     to_gain: float = 0.0
-    beside: np.ndarray | None = None
+    also_columns: np.ndarray | None = None
     starts: tuple[tuple[float, bool], ...] = ()
 
 
@@ -56,7 +56,7 @@ def descend(
     quick: bool = False,
     straight: bool = False,
     known: np.ndarray | None = None,
-    beside: np.ndarray | None = None,
+    also: np.ndarray | None = None,
 ) -> LocalFit:
     """Minimise least squares from ``start`` (d,), inside the layout's bounds: one loop, one state.
 
@@ -74,7 +74,7 @@ def descend(
     half the cost; they blur only the difference of two branches of nearly equal relaxation times.
     ``straight`` is for a start next to the optimum: steps have no second order, and the Jacobian of
     a step tells how much gain the step left. ``known`` are the residuals (N,) at ``start``, None
-    where they are to be computed. ``beside`` (d,) bool are ``fixed`` parameters whose derivatives
+    where they are to be computed. ``also`` (d,) bool are ``fixed`` parameters whose derivatives
     are asked for with the others.
     """
     layout = problem.layout
@@ -82,7 +82,7 @@ def descend(
     x = np.clip(start, layout.lower, layout.upper)
     r = problem.residuals(x) if known is None else known
     chi2 = float(r @ r)
-    asked = free if beside is None else free | beside
+    asked = free if also is None else free | also
     whole = np.zeros((r.size, int(asked.sum())))
     scale = np.zeros(int(free.sum()))
     jac = np.zeros((r.size, scale.size))
@@ -92,7 +92,7 @@ def descend(
     while done < iterations and not converged:
         done += 1
         whole = problem.jacobian(x, asked, r if quick else None)
-        jac = whole if beside is None else whole[:, free[asked]]
+        jac = whole if also is None else whole[:, free[asked]]
         normal, gradient = jac.T @ jac, jac.T @ r
         scale = np.maximum(np.sqrt(np.diag(normal)), 1e-3 * scale)
         safe = np.where(scale > 0.0, scale, 1.0)
@@ -148,8 +148,8 @@ def descend(
                 converged, to_gain = True, left
                 break
         converged = len(history) > patience and history[-1 - patience] - chi2 < enough
-    others = None if beside is None else whole[:, beside[asked]]
-    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged, to_gain, others)
+    also_columns = None if also is None else whole[:, also[asked]]
+    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged, to_gain, also_columns)
 
 
 def gain_that_counts(chi2: float, samples: int) -> float:

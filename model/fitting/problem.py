@@ -217,7 +217,7 @@ class Problem:
                     if not central:
                         above, below = moved[1:], moved[0]
                     above -= below
-                    # linear, so that what is compared is told of differences as of readings
+                    # linear, so that what is compared holds for differences as for readings
                     found[i] = record.seen(above)
 
         parallel_map(run, [[i] for i in range(len(self.records))], self.workers)

@@ -105,7 +105,7 @@ class Valleys:
     firm: tuple[int, ...]
     points: Mapping[tuple[int, ...], np.ndarray]
 
-    def beside(self, site: int, sites: Sequence[int]) -> list[int]:
+    def spare_at(self, site: int, sites: Sequence[int]) -> list[int]:
         """Return the spare branches that are at a ``site``, such as that of a firm branch."""
         return [s for s, its in zip(self.spare, sites, strict=True) if its == site]
 
@@ -132,7 +132,7 @@ class Valleys:
         problem = copy(self.best.problem)
         problem.layout = _cells(self, sites)
         x = self.points[tuple(sites)]
-        held = _held(self.best, self.beside(_ABSENT, sites))
+        held = _held(self.best, self.spare_at(_ABSENT, sites))
         own = float(np.sum(problem.residuals(x) ** 2))
         chi2 = self.best.chi2 if own <= self.best.chi2 + self.best.threshold else own
         return replace(self.best, problem=problem, x=x, held=held, chi2=chi2)
@@ -140,7 +140,7 @@ class Valleys:
     @property
     def absent(self) -> frozenset[int]:
         """Spare branches that need not be there."""
-        return frozenset(b for sites in self.points for b in self.beside(_ABSENT, sites))
+        return frozenset(b for sites in self.points for b in self.spare_at(_ABSENT, sites))
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -370,7 +370,7 @@ def widened(
             for branch in found.firm:
                 total = layout.quantities[_columns(layout, branch)["mu", 0]].constraint
                 if branch in found.parts and (total is None or total.mean is not None):
-                    ends = _of_sum(at, branch, found.beside(branch, sites), jacobian, tick)
+                    ends = _of_sum(at, branch, found.spare_at(branch, sites), jacobian, tick)
                     sums[branch] = _hull(sums.get(branch, ends), ends)
     except end:
         sums = {}
@@ -418,16 +418,16 @@ def _cells(found: Valleys, sites: Sequence[int]) -> FitLayout:
 def _of_sum(
     at: Optimum,
     branch: int,
-    beside: Sequence[int],
+    spare_at: Sequence[int],
     jacobian: np.ndarray,
     tick: Callable[[], None],
 ) -> Span:
-    """Return the interval in Pa of the modulus of ``branch`` and those ``beside`` it."""
+    """Return the interval in Pa of the modulus of ``branch`` and those ``spare_at`` it."""
     layout = at.problem.layout
     j = _columns(layout, branch)["mu", 0]
-    if beside:
+    if spare_at:
         problem = copy(at.problem)
-        parts = [_columns(layout, b)["mu", 0] for b in beside]
+        parts = [_columns(layout, b)["mu", 0] for b in spare_at]
         problem.layout, problem.coarse_columns = _Shared(layout, j, parts), None
         at = replace(at, problem=problem, x=problem.layout.coordinates(layout.values(at.x)))
         jacobian = problem.jacobian(at.x, ~at.held)
@@ -442,8 +442,8 @@ def _sum(found: Valleys, branch: int, span: Span) -> Estimate:
     """Return the estimate of all that relaxes as the ``branch`` does, in the reported fit."""
     layout, best = found.best.problem.layout, found.best
     values = layout.values(best.x)
-    here = [branch, *found.beside(branch, _sites(found, best.x))]
-    ever = {branch, *(b for sites in found.points for b in found.beside(branch, sites))}
+    here = [branch, *found.spare_at(branch, _sites(found, best.x))]
+    ever = {branch, *(b for sites in found.points for b in found.spare_at(branch, sites))}
     total = float(sum(values[_columns(layout, b)["mu", 0]] for b in here))
     when = f"about {values[_time(layout, branch)]:.3g}"
     return _together(here, total, span, when, ever.difference(here))

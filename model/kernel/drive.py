@@ -27,7 +27,7 @@ from dearig.model.kernel.propagator import (
     propagator_for,
 )
 from dearig.model.kernel.rk4 import rk4_steps
-from dearig.model.kernel.rodas import LONGEST, WORTH, cross_by_rodas
+from dearig.model.kernel.rodas import LONGEST, STEPS_OF_RODAS, cross_by_rodas
 from dearig.model.kernel.status import BAD_INPUT, CAREFUL, NOT_CONVERGED, OK
 from dearig.model.kernel.step_control import (
     DRAG_SUBSTEPS_MAX,
@@ -275,7 +275,7 @@ def _follow(
         # the stiff method, section 8
         if not explicit:
             fresh = True
-            taken += WORTH
+            taken += STEPS_OF_RODAS
             if policy.acting:
                 status = NOT_CONVERGED
             else:

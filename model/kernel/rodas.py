@@ -29,10 +29,10 @@ from dearig.model.kernel.rodas_coefficients import ALPHA, GAMMA, A, C, D
 from dearig.model.kernel.status import NOT_CONVERGED, OK
 from dearig.model.kinematics import electric, electric_slope
 
-__all__ = ["LONGEST", "WORTH", "cross_by_rodas", "rodas_step"]
+__all__ = ["LONGEST", "STEPS_OF_RODAS", "cross_by_rodas", "rodas_step"]
 
 LONGEST = 2e-2  #: s, of a step; below that the error estimate rules
-WORTH = 10  #: explicit steps that take as long as a sample by this method, at least
+STEPS_OF_RODAS = 10  #: explicit steps that take as long as a sample by this method, at least
 _TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
 _HALVINGS = 2.0**-17  # of the longest step: a shorter one has not converged
 

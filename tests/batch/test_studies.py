@@ -198,7 +198,7 @@ def test_a_campaign_s_settings_are_columns_and_its_warm_up_is_left_out(bench: Be
         '[grid]\n"segment.0.amplitude_kV" = [1.0, 2.0]\n'
     )
     found = subjects_of([bench.out], bench.folder / "study")
-    assert [(s.name, dict(s.beside)) for s in found] == [
+    assert [(s.name, dict(s.labels)) for s in found] == [
         (f"three-000{i}.h5", {"run": f"three-000{i}", "set segment.0.amplitude_kV": float(i)})
         for i in (1, 2)
     ]

@@ -104,7 +104,7 @@ class Condition:
     label, unit : str
         What it is, and the unit of its values.
     tight : float
-        Range below which it counts as hardly varied between runs.
+        Range below which it counts as not varied between runs.
     short, slope_unit : str
         Label in a line of several conditions, and unit after "per"; by default ``label``, ``unit``.
     """

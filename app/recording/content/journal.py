@@ -253,10 +253,10 @@ def whole_journal(path: Path) -> tuple[int, int, dict[int, bytes]] | None:
     file: every byte in the file must be the old or the new one. Memory is bounded by the pages of
     the file. Raises ``InputError`` for one that is not a file, such as a pipe, and ``OSError``.
     """
-    beside = journal_of(path)
-    if not os.path.lexists(beside):
+    place = journal_of(path)
+    if not os.path.lexists(place):
         return None
-    with open_input(beside, "journal") as stream, path.open("rb") as file:
+    with open_input(place, "journal") as stream, path.open("rb") as file:
         about = file.seek(0, 2)
         head = stream.read(HEAD.size)
         if len(head) < HEAD.size or head[: len(MAGIC)] != MAGIC:

@@ -115,8 +115,8 @@ def _events(text: str) -> Iterator[Event]:
 
 def _columns(text: str) -> Iterator[tuple[str, tuple[str, str, str]]]:
     """Yield each column in ``text`` with name, unit and label; both are empty for a model's."""
-    for column, told in _noted(text).items():
-        match told:
+    for column, stated in _noted(text).items():
+        match stated:
             case [str(name)]:
                 yield column, (name, "", "")
             case [str(name), str(unit), str(label)]:

@@ -222,8 +222,8 @@ def prepare(
     specimen = Specimen(options.gauge_length_mm, options.area_mm2)
     stop = Flag()
     # hashing a file takes as long as reading its numbers
-    with ThreadPoolExecutor(1) as beside:
-        digest = beside.submit(file_sha256, path, stop)
+    with ThreadPoolExecutor(1) as pool:
+        digest = pool.submit(file_sha256, path, stop)
         try:
             values = values_of(chosen, specimen, options.rate_Hz, options.skip_bad_rows)
         except BaseException:

@@ -181,12 +181,12 @@ def _signature(source: Source, names: Sequence[str]) -> str:
     """Return what tables of the same layout, names and units have in common."""
     layout = getattr(source, "layout", None)
     units: Mapping[str, str] = getattr(source, "units", {})
-    told = [
+    content = [
         type(source).__name__,
         getattr(layout, "delimiter", None),
         [[own_name(source, name), units.get(name, "")] for name in names],
     ]
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:32]
 
 
 def _columns(source: Source, shown: int) -> list[ColumnPreview]:
@@ -223,8 +223,8 @@ def _overviews(source: Source, names: Sequence[str], shown: int) -> dict[str, Co
     """Return first values, number and range of each column; none where it cannot be read."""
     whole = getattr(source, "overview", None)
     if whole is not None:
-        told: dict[str, ColumnOverview] = whole(names, shown)
-        return told
+        overviews: dict[str, ColumnOverview] = whole(names, shown)
+        return overviews
     found = {}
     for name in names:
         try:

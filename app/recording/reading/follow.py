@@ -22,7 +22,7 @@ from dearig.recording.reading.recording import RecordedEvent
 
 __all__ = ["Extremes", "Follower", "News"]
 
-#: Bins in which samples are told that were passed over.
+#: Bins that summarise the samples that were passed over.
 _BINS = 1000
 
 #: Time in s, minimum and maximum (n,) of a value over n bins.
@@ -70,7 +70,7 @@ class Follower:
     def look(self, most: int | None = None, newest: bool = False) -> News:
         """Return what is new since the last look, at most ``most`` samples.
 
-        With ``newest`` these are the last ones, and those before them are told by their extremes.
+        With ``newest`` these are the last ones, and those before them are shown by their extremes.
         A flush makes new samples visible, four times a second. Raises ``InputError`` for a
         file that is not a recording of a run.
         """

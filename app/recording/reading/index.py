@@ -427,8 +427,8 @@ def lines(entries: Sequence[Entry]) -> list[str]:
             facts.append(f"INCOMPLETE: {entry.outcome}")
         if entry.start_is_import:
             facts.append("the time is that of the import")
-        told = ", ".join(fact for fact in facts if fact)
-        shown.append(f"{local_time(entry.start_time):<25}  {length:>10}  {entry.path}: {told}")
+        line = ", ".join(fact for fact in facts if fact)
+        shown.append(f"{local_time(entry.start_time):<25}  {length:>10}  {entry.path}: {line}")
     return shown
 
 

@@ -99,13 +99,13 @@ def _environment(recording: Recording) -> dict[str, Any] | None:
     readings = recording.environment
     if readings is None:
         return None
-    told: dict[str, Any] = {"readings": int(readings.sample.size)}
+    ranges: dict[str, Any] = {"readings": int(readings.sample.size)}
     for name in CONDITIONS:
         values = readings.of(name)
         if values is not None:
             known = values[np.isfinite(values)]
-            told[name] = [float(known.min()), float(known.max())] if known.size else None
-    return told
+            ranges[name] = [float(known.min()), float(known.max())] if known.size else None
+    return ranges
 
 
 def _room_row(environment: dict[str, Any]) -> str:
@@ -130,10 +130,10 @@ def _channel(recording: Recording, name: str) -> dict[str, Any]:
     low = high = None
     if known.any():
         low, high = float(whole.low[known].min()), float(whole.high[known].max())
-    told = {"name": name, "unit": recording.unit(name), "min": low, "max": high}
+    row = {"name": name, "unit": recording.unit(name), "min": low, "max": high}
     if name in recording.declared:
-        told["label"] = recording.declared[name]
-    return told
+        row["label"] = recording.declared[name]
+    return row
 
 
 _DECIMALS_MAX = 6

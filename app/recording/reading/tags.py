@@ -61,12 +61,12 @@ def read_tags(folder: Path) -> tuple[Tagged, ...]:
         return ()
     content = read_input(path, "file of tags", BYTES_MAX)
     try:
-        told = parse_json(content)
-        if told["format"] != FORMAT:
+        stored = parse_json(content)
+        if stored["format"] != FORMAT:
             raise InputError(f"{path} is not of format {FORMAT}")
         return tuple(
             Tagged(str(row["file"]), str(row["identifier"]), clean_tags(map(str, row["tags"])))
-            for row in told["recordings"]
+            for row in stored["recordings"]
         )
     except (ValueError, TypeError, LookupError, RecursionError) as error:
         raise InputError(f"{path} is damaged: {type(error).__name__}: {error}") from error

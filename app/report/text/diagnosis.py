@@ -81,11 +81,11 @@ def _as_tabled(
     signatures: Sequence[Signature], stand: Evaluation, kind: str
 ) -> tuple[Signature, ...]:
     compared, shown = {c.name: c for c in stand.train}, SHOWN[kind]
-    told = []
+    tabled = []
     for s in signatures:
         c = compared.get(s.record)
         if c is None or not c.noise:
-            told.append(s)
+            tabled.append(s)
             continue
         rms, noise = (significant(v * shown.error_factor) for v in (c.errors.rms, c.noise))
         size = (
@@ -97,8 +97,8 @@ def _as_tabled(
             size += ": noise, and slow changes of its own"
         elif s.is_noise:
             size += ": only noise is left"
-        told.append(replace(s, rms=c.errors.rms, noise=c.noise, words=(size, *s.words[1:])))
-    return tuple(told)
+        tabled.append(replace(s, rms=c.errors.rms, noise=c.noise, words=(size, *s.words[1:])))
+    return tuple(tabled)
 
 
 def headline(outcome: DiagnoseOutcome) -> str:
@@ -234,8 +234,8 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
         )
     if "training" in reasons:
         left = [
-            f"{s.record} keeps {significant(told.rms / told.noise)} times its noise"
-            for s, told in zip(outcome.finding.after, signatures_of(outcome)[1], strict=True)
+            f"{s.record} keeps {significant(stated.rms / stated.noise)} times its noise"
+            for s, stated in zip(outcome.finding.after, signatures_of(outcome)[1], strict=True)
             if s.rms / s.noise > TOLERANCE
         ]
         yield f"Not every training recording is explained: {listed(left)}."
@@ -430,7 +430,7 @@ def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
     yield from _events_of_each_run((*outcome.after.train, *outcome.after.validation))
 
 
-_SAME_MOMENT = 0.02  # s: times of events are told to a hundredth
+_SAME_MOMENT = 0.02  # s: times of events are stated to a hundredth
 
 
 def _events_of_each_run(comparisons: Sequence[Comparison]) -> Iterator[str]:

@@ -80,7 +80,7 @@ class Table:
         ]
         return sum(min(width, WORD_MAX) + 1 for width in widths) > _PHONE_WIDTH
 
-    def beside(self, other: Table) -> Table:
+    def with_columns_of(self, other: Table) -> Table:
         """Return both tables as one. Raises ``ValueError`` unless they have the same rows."""
         if [r.cells[0] for r in self.rows] != [r.cells[0] for r in other.rows]:
             raise ValueError(f"{self.title!r} and {other.title!r} do not have the same rows")

@@ -160,8 +160,8 @@ def _effect_text(trend: Trend, effect: TrendSlope) -> str:
     )
     if effect.verdict == "one_film":
         return f"{name}: one film has an effect of its own: {own}; the others have {size}."
-    told = f": {own}" if own else ""
-    return f"{name}: films differ{told}; their mean is {size}."
+    detail = f": {own}" if own else ""
+    return f"{name}: films differ{detail}; their mean is {size}."
 
 
 def _change_text(trend: Trend, change: ChangePoint) -> str:

@@ -68,7 +68,7 @@ class CampaignThread(PlayThread):
         super().__init__(parent)
         self._request = request
         self._overlays, self._drive = overlays, drive
-        self._told = False
+        self._announced = False
         self._stage = ""
         self.live: Live | None = None
         self._looking: Live | None = None  # whose thread has not ended
@@ -118,10 +118,10 @@ class CampaignThread(PlayThread):
         return Live(self._overlays, self._drive)
 
     def _note(self, entries: Sequence[Mapping[str, Any]]) -> None:
-        if self._told and entries[-1]["event"] == "started":
+        if self._announced and entries[-1]["event"] == "started":
             self.live = None  # the readings of the last run are no longer those of this moment
-        self.noted.emit(entries, not self._told)
-        self._told = True
+        self.noted.emit(entries, not self._announced)
+        self._announced = True
 
     def _progress(self, stage: str, part: float) -> None:  # noqa: ARG002
         if stage != self._stage:

@@ -116,7 +116,7 @@ class HighVoltageStatus(QObject):
         self._next = ""  # what a campaign does next
         self._output: OutputState | None = None
         self._address = session.address  # of the rig that ``output`` belongs to
-        self._told = False  # during a run: the output at its end is known
+        self._is_final = False  # during a run: the output at its end is known
         self._state = HighVoltage.NOT_CONTACTED
         self._deadline = 0.0
         self._cause = ""  # what has stopped or disarmed, and when
@@ -159,7 +159,7 @@ class HighVoltageStatus(QObject):
     @property
     def live(self) -> bool:
         """True while the voltage may be up and its end is not known."""
-        return self.running and not self._told
+        return self.running and not self._is_final
 
     @property
     def current(self) -> bool:
@@ -237,7 +237,7 @@ class HighVoltageStatus(QObject):
         if phase in (HighVoltage.ARMED, HighVoltage.ON):
             self._cause = ""
         if phase is HighVoltage.ON:
-            self._told = False
+            self._is_final = False
             self._forget_numbers()
         self._phase = phase
         self._refresh()
@@ -273,7 +273,7 @@ class HighVoltageStatus(QObject):
 
     def set_output(self, output: OutputState) -> None:
         """Set what was measured of the output at the end of a run, also before the run's end."""
-        self._output, self._address, self._told = output, self._session.address, True
+        self._output, self._address, self._is_final = output, self._session.address, True
         self._refresh()
 
     @Slot(object)

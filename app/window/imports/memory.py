@@ -52,8 +52,8 @@ class ImportMemory:
 
     def keep(self, signature: str, chosen: Remembered) -> None:
         """Keep ``chosen`` for tables with ``signature``."""
-        told = asdict(chosen) | {"at": self._now().isoformat(timespec="seconds")}
-        self._settings.setValue(f"{_GROUP}/{signature}", json.dumps(told))
+        stored = asdict(chosen) | {"at": self._now().isoformat(timespec="seconds")}
+        self._settings.setValue(f"{_GROUP}/{signature}", json.dumps(stored))
         self._settings.beginGroup(_GROUP)
         known = self._settings.childKeys()
         self._settings.endGroup()
@@ -70,26 +70,26 @@ class ImportMemory:
 def _remembered(text: str) -> Remembered | None:
     """Return the choices in ``text``; None if the settings hold something else."""
     try:
-        told = json.loads(text)
-        columns = {int(place): _column(choice) for place, choice in told["columns"].items()}
-        line, rate = told["names_line"], told["rate_Hz"]
+        stored = json.loads(text)
+        columns = {int(place): _column(choice) for place, choice in stored["columns"].items()}
+        line, rate = stored["names_line"], stored["rate_Hz"]
         return Remembered(
-            str(told["file"]),
+            str(stored["file"]),
             columns,
             None if line is None else int(line),
             None if rate is None else float(rate),
-            told["skip_bad_rows"] is True,
-            str(told["kinematics"]),
-            str(told["at"]),
+            stored["skip_bad_rows"] is True,
+            str(stored["kinematics"]),
+            str(stored["at"]),
         )
     except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
         return None
 
 
-def _column(told: dict[str, object]) -> ColumnChoice:
-    quantity, unit = str(told["quantity"]), str(told["unit"])
+def _column(stored: dict[str, object]) -> ColumnChoice:
+    quantity, unit = str(stored["quantity"]), str(stored["unit"])
     if quantity and unit not in units_of(quantity, raw=True):
         raise ValueError(f"{quantity} in {unit}")
-    numbers = (told["scale"], told["offset"])
+    numbers = (stored["scale"], stored["offset"])
     scale, offset = (None if n is None else float(str(n)) for n in numbers)
     return ColumnChoice(quantity, unit, scale, offset)

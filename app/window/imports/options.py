@@ -75,15 +75,15 @@ class ImportFields(QWidget):
         for name in KINEMATICS:
             self.kinematics.addItem(name, name)
         self.kinematics.setToolTip("How the film was held")
-        self.take_told = button("", "Enter the sizes that the head of the file tells")
-        self.take_told.clicked.connect(self._take_stated)
+        self.use_stated = button("", "Enter the sizes that the head of the file tells")
+        self.use_stated.clicked.connect(self._take_stated)
         self.form = QFormLayout()
         self.form.addRow("Names in &line", self.names_line)
         self._add("rate_Hz", "&Rate (Hz)", "Sample rate, in place of a column for time")
         self.form.addRow(self.skip)
         for key, words, tip in _SPECIMEN:
             self._add(key, words, tip)
-        self.form.addRow(self.take_told)
+        self.form.addRow(self.use_stated)
         self.form.addRow("&Film and load", self.film)
         for key, words, tip in _FILM:
             self._add(key, words, tip)
@@ -122,7 +122,7 @@ class ImportFields(QWidget):
         for key, needed in (("gauge_length_mm", length), ("area_mm2", area)):
             self.form.setRowVisible(self._lines[key], needed)
         stated = (length and self._stated.gauge_length_mm, area and self._stated.area_mm2)
-        self.form.setRowVisible(self.take_told, any(stated))
+        self.form.setRowVisible(self.use_stated, any(stated))
         self.form.setRowVisible(self.film, kind == "actuator")
         for key, _, _ in _FILM:
             self.form.setRowVisible(self._lines[key], given)
@@ -139,7 +139,7 @@ class ImportFields(QWidget):
             parts.append(f"length {stated.gauge_length_mm:g} mm")
         if stated.area_mm2 is not None:
             parts.append(f"cross-section {stated.area_mm2:g} mm²")
-        self.take_told.setText(f"Use what the file says: {', '.join(parts)}")
+        self.use_stated.setText(f"Use what the file says: {', '.join(parts)}")
         self.form.setRowVisible(self.names_line, text)
         self.show_kind(self._kind, self._there)
 

@@ -81,7 +81,7 @@ class ProgramErrors(QObject):
         super().__init__(parent)
         self._lock = threading.Lock()
         self._errors: dict[object, ProgramError] = {}
-        self._told = True  # False while a signal is on its way: a storm of errors sends one
+        self._answered = True  # False while a signal is on its way: a storm of errors sends one
         self._before: tuple[Any, Any, Any] | None = None
         self._qt_before: Any = None
         self._handler = _Records(self)
@@ -141,7 +141,7 @@ class ProgramErrors(QObject):
             else:
                 fresh = replace(known, count=known.count + 1, last=now)
                 self._errors[key] = fresh
-            tell, self._told = self._told, False
+            tell, self._answered = self._answered, False
         if not logged and fresh.count == 1:
             log.error("error in the program: %s", fresh.sentence, exc_info=error)
         elif not logged and _power_of_ten(fresh.count):
@@ -152,7 +152,7 @@ class ProgramErrors(QObject):
     @Slot()
     def _tell(self) -> None:
         with self._lock:
-            self._told = True
+            self._answered = True
         self.changed.emit()
 
     def _uncaught(

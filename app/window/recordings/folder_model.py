@@ -381,8 +381,8 @@ def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
             return "The model was fitted to this recording; this error is not validation"
         return COLUMNS[column].tip
     if column == ENDED:
-        told = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in summary.events]
-        return "\n".join([summary.outcome, *told])
+        lines = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in summary.events]
+        return "\n".join([summary.outcome, *lines])
     if COLUMNS[column].wide and head not in ("Recording", "Notes"):
         return f"{COLUMNS[column].name}: {COLUMNS[column].text(summary) or NO_VALUE}"
     known = {field.label: summary.texts.get(key, "") for key, field in TEXTS.items()}

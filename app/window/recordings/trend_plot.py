@@ -163,8 +163,8 @@ class TrendPlot(QWidget):
         best = min(away, key=lambda found: found[0], default=None)
         if best is not None and best[0] <= _NEAR**2:
             summary = best[1]
-            told = numbers(summary).get(self.quantity.currentData())
-            shown = "" if told is None else significant(told, 4)
+            number = numbers(summary).get(self.quantity.currentData())
+            shown = "" if number is None else significant(number, 4)
             self.words.show_text(f"{summary.name}: {shown}, {how_it_ended(summary)[1]}")
             self.picked.emit(summary.path)
 

@@ -189,7 +189,7 @@ def general(
         All else that ``Effect`` takes.
     """
     count = shapes.count
-    beside = (*((scale,) if scale else ()), *more)
+    others = (*((scale,) if scale else ()), *more)
 
     def curve(values: Mapping[str, float]) -> Curve:
         x = shapes.range()
@@ -199,10 +199,10 @@ def general(
         return Curve(x * size * over.per_si, y * shows.per_si, over.label, shows.label)
 
     return Effect(
-        parameters=(*weights.parameters(count), *(p for p, _ in beside)),
+        parameters=(*weights.parameters(count), *(p for p, _ in others)),
         law=Law(
             equations=equations,
-            symbols=(*weights.symbols(count), *(symbol for _, symbol in beside)),
+            symbols=(*weights.symbols(count), *(symbol for _, symbol in others)),
             source=source,
             where=(*where, *shapes.where, (f"{weights.symbol}_i", weights.stands_for)),
         ),

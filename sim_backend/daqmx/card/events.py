@@ -63,7 +63,7 @@ def check_intervals(task: Task, buffer: int) -> None:
 def restart(task: Task) -> None:
     """Count the samples of a new start from zero; events of the previous one stay due."""
     for listener in task.listeners:
-        listener.told = 0
+        listener.reported = 0
 
 
 def observe(task: Task, samples: int, status: int | None) -> None:
@@ -71,11 +71,11 @@ def observe(task: Task, samples: int, status: int | None) -> None:
     for listener in task.listeners:
         if listener.every is not None:
             passed = samples // listener.every
-            more = max(0, min(passed - listener.told, _DUE_MAX - len(listener.due)))
+            more = max(0, min(passed - listener.reported, _DUE_MAX - len(listener.due)))
             listener.due += [0] * more
-            listener.told += more
-        elif status is not None and not listener.told:
-            listener.told = 1
+            listener.reported += more
+        elif status is not None and not listener.reported:
+            listener.reported = 1
             listener.due.append(status)
 
 

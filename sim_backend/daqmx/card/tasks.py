@@ -85,14 +85,14 @@ class Listener:
 
     ``signal`` is DAQmx's signal of an event by a signal, which comes with every sample.
 
-    ``owner`` is the call that listens. ``told`` counts the events of the present start; ``due``
+    ``owner`` is the call that listens. ``reported`` counts the events of the present start; ``due``
     has the status of each unsent one.
     """
 
     every: int | None
     owner: object
     signal: int | None = None
-    told: int = 0
+    reported: int = 0
     due: list[int] = field(default_factory=list)
 
 

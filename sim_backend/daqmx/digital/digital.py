@@ -100,7 +100,7 @@ class DigitalOutput(CardWork):
         self._set_line = set_line
         self._trigger = trigger
         self._waits = AwaitedEdge()
-        self._told = 0  # ticks that the wire knows
+        self._known = 0  # ticks that the wire knows
 
     def check_start(self) -> None:
         if self.task.clock is not None:
@@ -125,7 +125,7 @@ class DigitalOutput(CardWork):
             raise DaqmxError(Code.OUTPUT_BUFFER_EMPTY, f"Task Name: {task.name}")
         total = task.clock.samples if task.clock.finite else None
         task.generation = Generation(task.waveform, task.clock.rate, at, total)
-        self._told = 0
+        self._known = 0
         for row, line in enumerate(task.line_names):
             self._terminals.drive(line).follow(task.generation, row)
 
@@ -144,15 +144,15 @@ class DigitalOutput(CardWork):
         """Let the wire know every change of a line up to ``now``."""
         # the present sample is on the lines too, unless the end has counted it
         end = generation.ticks(now) + (0 if generation.finished(now) else 1)
-        if end <= self._told:
+        if end <= self._known:
             return
-        first = max(0, self._told - 1)
+        first = max(0, self._known - 1)
         levels = generation.at_ticks(np.arange(first, end)) != 0
         for row, line in zip(levels, self.task.line_names, strict=True):
             changed = np.flatnonzero(row[1:] != row[:-1]) + 1
-            for place in [*([0] if self._told == 0 else []), *changed.tolist()]:
+            for place in [*([0] if self._known == 0 else []), *changed.tolist()]:
                 self._set_line(line, bool(row[place]), generation.due(first + place))
-        self._told = end
+        self._known = end
         generation.waveform.drop_before(max(0, end - 1))
 
     def end(self, now: float) -> None:

@@ -40,7 +40,7 @@ def fit_with(*members, criterion):
 @pytest.mark.parametrize(
     ("best", "raced", "why"),
     [
-        (fit_with(criterion=0.0), 2.0, "no effect is worth its parameters"),
+        (fit_with(criterion=0.0), 2.0, "no effect gains more than its parameters cost"),
         (fit_with(criterion=0.0), -900.0, "load inertia would explain too little of what is left"),
         (fit_with(DRIFT, criterion=-4e3), -900.0, "slow drift of the reading is more probable"),
         (fit_with("thermal softening", criterion=-4e3), -900.0, "thermal softening is more prob"),

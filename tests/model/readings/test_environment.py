@@ -29,7 +29,7 @@ def test_effects_of_the_air_need_recordings_that_differ(
         ([-0.1, 0.1], []),
         ([0.0], ["the room's humidity was recorded (50.0 %), but one recording cannot show"]),
         ([0.0, None], ["the room's humidity was recorded in 1 of 2 recordings"]),
-        ([0.0, 0.01], ["hardly differs between the recordings (50.0 to 51.0 %)"]),
+        ([0.0, 0.01], ["differs too little between the recordings (50.0 to 51.0 %)"]),
     ],
 )
 def test_what_recordings_cannot_show_is_said(humidities: list, words: list[str]) -> None:

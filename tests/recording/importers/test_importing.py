@@ -263,7 +263,7 @@ def test_a_mean_within_the_noise_is_left_alone(tmp_path: Path) -> None:
             {"metadata": RunMetadata(film=THESIS_FILM)},
             "spans 1000 mm and the film is 75 mm",
         ),
-        (ACTUATOR.replace("_mm", "_m"), {}, "spans 1000 mm and a film is hardly 500 mm"),
+        (ACTUATOR.replace("_mm", "_m"), {}, "spans 1000 mm and a film is at most 500 mm"),
         (ACTUATOR.replace("0.25", "0").replace(",1\n", ",0.00001\n"), {}, "spans 0.01 um only"),
         (ACTUATOR.replace("kV", "V"), {}, "voltage reaches 2 V only; is it in kV"),
         (ACTUATOR.replace(",2,", ",2000,"), {}, "reaches 2000 kV; is it in V and not in kV"),

@@ -307,7 +307,7 @@ class TestTables:
     def test_tables_of_other_rows_do_not_join(self):
         one, two = (error_table("x", (actuator_comparison(n),)) for n in ("a", "b"))
         with pytest.raises(ValueError, match="same rows"):
-            one.beside(two)
+            one.with_columns_of(two)
 
 
 class TestWords:

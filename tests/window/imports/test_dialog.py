@@ -205,7 +205,7 @@ def test_a_table_and_the_size_of_the_specimen_are_asked_for(opened, qtbot, tmp_p
     settled(dialog, qtbot)
     assert dialog.to_do.text() == "Enter the gauge length.\nEnter the cross-section."
     # what the head of the file tells is offered, not taken
-    qtbot.mouseClick(dialog.fields.take_told, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(dialog.fields.use_stated, Qt.MouseButton.LeftButton)
     settled(dialog, qtbot)
     run = imported(dialog, qtbot)
     assert run.stretch[-1] == pytest.approx(1.0 + 0.06 * 29 / 30)

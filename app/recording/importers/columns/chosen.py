@@ -150,5 +150,5 @@ def label_in(source: Source, column: str) -> Label:
     found = label_of(own_name(source, column), unit)
     if found.quantities or found.raw or not labels.get(column):
         return found
-    told = label_of(labels[column], unit)
-    return told if told.quantities or told.raw or not found.unit else found
+    stated = label_of(labels[column], unit)
+    return stated if stated.quantities or stated.raw or not found.unit else found

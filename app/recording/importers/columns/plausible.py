@@ -62,7 +62,7 @@ def plausibility_warnings(values: Mapping[str, np.ndarray], film: Film | None) -
     if "displacement" in values:
         span = _span(values["displacement"])
         longest, whose = (
-            (film.length, "the film is") if film else (DISPLACEMENT_SPAN.high, "a film is hardly")
+            (film.length, "the film is") if film else (DISPLACEMENT_SPAN.high, "a film is at most")
         )
         check(
             "displacement",

@@ -40,8 +40,8 @@ def start_of(source: Source, column: str | None, first: float) -> MeasurementSta
         began, first = _epoch_of(first), (0.0 if _epoch_of(first) else first)
     if began is not None:
         return _start(began, first, f"the column {column!r}")
-    told = getattr(source, "started", None)
-    return None if told is None else _start(told, 0.0, "the file's waveforms")
+    stated = getattr(source, "started", None)
+    return None if stated is None else _start(stated, 0.0, "the file's waveforms")
 
 
 def _epoch_of(first: float) -> datetime | None:

@@ -167,7 +167,7 @@ def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[s
 
     Raises ``NeedsOptionError`` for a size of the specimen that is missing, for both at once.
     """
-    there, told = chosen.picked, specimen_from_header(getattr(chosen.source, "block", ()))
+    there, stated = chosen.picked, specimen_from_header(getattr(chosen.source, "block", ()))
     length = next((q for q in LENGTHS if q in there), None)
     pull = next((q for q in PULLS if q in there), None)
     if length is None:
@@ -187,13 +187,13 @@ def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[s
             f"displacement and no stretch; give the specimen's length at rest"
             f"{_hint(chosen, 'length')}"
         )
-        answers["gauge_length_mm"] = _typed(told.gauge_length_mm, "LENGTH")
+        answers["gauge_length_mm"] = _typed(stated.gauge_length_mm, "LENGTH")
     if pull == "force" and specimen.area_mm2 is None:
         missing.append(
             f"force and no nominal stress; give the specimen's cross-section at rest"
             f"{_hint(chosen, 'width', 'thickness', 'section')}"
         )
-        answers["area_mm2"] = _typed(told.area_mm2, "AREA")
+        answers["area_mm2"] = _typed(stated.area_mm2, "AREA")
     if missing:
         raise NeedsOptionError(
             f"{chosen.source.path} has {'; and '.join(missing)}", answers=answers

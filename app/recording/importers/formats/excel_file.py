@@ -162,13 +162,13 @@ class _Sheet:
         """
         if self._numbers is None:
             self._numbers = self._read()
-        beside = [
+        of_group = [
             np.frombuffer(self._numbers[c.place])
             for c in self.layout.columns
             if c.group == column.group
         ]
-        there = np.zeros(beside[0].size, dtype=bool)
-        for numbers in beside:
+        there = np.zeros(of_group[0].size, dtype=bool)
+        for numbers in of_group:
             there |= ~np.isnan(numbers)
         for place, row in self._wrong:
             if any(c.place == place and c.group == column.group for c in self.layout.columns):
@@ -259,7 +259,7 @@ class _Sheet:
         """Yield the first ``most`` rows; of formulas, their ``values`` or themselves."""
         with _opened(self.path, values) as book:
             sheet = book[self.name]
-            told = max(sheet.max_row or 0, 1)
+            stated = max(sheet.max_row or 0, 1)
             sheet.reset_dimensions()  # what a file says of them may be wrong
             rows = iter(sheet.iter_rows(values_only=True))
             for number in itertools.count(1):
@@ -273,7 +273,7 @@ class _Sheet:
                     )
                 yield row
                 if number % REPORTED == 0:
-                    self.report(min(number / told, 1.0))
+                    self.report(min(number / stated, 1.0))
         if row is not None and most == ROWS_MAX:
             raise InputError(
                 f"{self.path}, sheet {printable(self.name)!r}: there are more than {ROWS_MAX:,} "
@@ -314,8 +314,8 @@ def _number(cell: Cell, column: TextColumn) -> tuple[float, str]:
     text = _text(cell)
     number = number_in(text, column)
     if number is None or not math.isfinite(number):
-        told = cell if isinstance(cell, str) else text
-        return math.nan, complaint_about(told.strip(), number)
+        stated = cell if isinstance(cell, str) else text
+        return math.nan, complaint_about(stated.strip(), number)
     return number, ""
 
 

@@ -91,20 +91,20 @@ def pickled_texts(owner: h5py.Group | h5py.Dataset, name: str) -> list[str]:
 
 def own_scale(data: h5py.Dataset) -> str:
     """Return an attribute that scales ``data`` in a way of which no convention says how, or ""."""
-    told = {
+    stated = {
         name: numbers_in(data, name) or texts_in(data, name)[:1]
         for name in data.attrs
         if name not in _OF_CF or not numbers_in(data, name)
     }
-    if own := stated_scale(told, integers=data.dtype.kind in "iu"):
+    if own := stated_scale(stated, integers=data.dtype.kind in "iu"):
         return own
     # of its group: a scale that is called as the dataset is, or a plain one
     group, called = data.parent, data.name.rpartition("/")[2]
-    beside = (
+    scales = (
         (name, numbers_in(group, name)) for name in group.attrs
         if scale_of(name, called) or name.lower() in ("gain", "scale")
     )  # fmt: skip
-    found = next(((n, v) for n, v in beside if set(v) - {1.0}), None)
+    found = next(((n, v) for n, v in scales if set(v) - {1.0}), None)
     return f"{found[0]} = {', '.join(f'{one:g}' for one in found[1][:4])}" if found else ""
 
 

@@ -195,7 +195,7 @@ class _Walk:
         if rows < width and rows <= ROWS_AS_COLUMNS:
             rows, width, turned = width, rows, not turned
         names = next((n for key in _COLUMNS if len(n := _texts(data, key)) == width), [])
-        told = next((u for key in _UNITS if len(u := _texts(data, key)) == width), [])
+        stated = next((u for key in _UNITS if len(u := _texts(data, key)) == width), [])
         names = names or block_names(data.parent, data.name.rpartition("/")[2], width)
         kind = time_kind(data, "value_type")
         axes = [_texts(data.parent, key)[:1] for key in ("xlabel", "xunit", "ylabel", "yunit")]
@@ -207,8 +207,8 @@ class _Walk:
                 (label,), (unit,) = axes[2 * place : 2 * place + 2]
             elif xy:
                 label = unit = ""
-            elif told:
-                unit = told[place]
+            elif stated:
+                unit = stated[place]
             yield inside, StoredColumn(
                 self._loader(data.name, _row(place) if turned else _column(place), unpack, kind),
                 rows, own_name, "s" if kind else unit, "time" if kind else label,

@@ -112,8 +112,8 @@ def _in_object(
     names, rows = value.get("columns"), value.get("data")
     if isinstance(names, list) and isinstance(rows, list) and _is_text(names) and _is_rows(rows):
         units = value.get("units")
-        told = units if isinstance(units, list) and _is_text(units) else ()
-        yield from _in_rows(rows, names, path, False, told)  # type: ignore[arg-type]
+        stated = units if isinstance(units, list) and _is_text(units) else ()
+        yield from _in_rows(rows, names, path, False, stated)  # type: ignore[arg-type]
         return
     if _is_rows_by_key(value):  # of rows that are numbered the keys say nothing
         rows = [*value.values()]
@@ -133,11 +133,11 @@ def _in_object(
         inside = f"{path}.{key}" if path else key
         unit = units.get(key) if isinstance(units, Mapping) else None
         unit = unit or value.get(f"{key}_unit") or value.get(f"{key}_units")
-        beside = {
+        scales = {
             word: by_name for word in _SCALES if isinstance(by_name := value.get(word), Mapping)
         }
         scaled = stated_scale(
-            {word: by_name[key] for word, by_name in beside.items() if key in by_name}
+            {word: by_name[key] for word, by_name in scales.items() if key in by_name}
         )
         one = _described(inner)
         if one is not None:

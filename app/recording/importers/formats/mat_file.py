@@ -65,9 +65,9 @@ class MatFile(StoredColumns):
 def _columns(value: Value, path: str, own: str, table: str) -> Iterator[tuple[str, StoredColumn]]:
     """Yield the columns in ``value``, which is called ``path``."""
     if isinstance(value, dict):
-        told = {name.lower(): text for name, text in value.items() if isinstance(text, str)}
-        label = next((told[name] for name in _NAMES if name in told), "")
-        unit = next((told[name] for name in _UNITS if name in told), "")
+        stated = {name.lower(): text for name, text in value.items() if isinstance(text, str)}
+        label = next((stated[name] for name in _NAMES if name in stated), "")
+        unit = next((stated[name] for name in _UNITS if name in stated), "")
         for name, inner in value.items():
             called = (label or own) if name.lower() in _GENERIC else name
             for place, column in _columns(inner, f"{path}.{name}", called, path):

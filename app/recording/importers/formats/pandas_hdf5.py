@@ -70,8 +70,8 @@ def field_names(data: h5py.Dataset, field: str, width: int) -> list[str]:
 def index_name(group: h5py.Group, data: h5py.Dataset, name: str) -> str:
     """Return the name of the index ``name`` of a table, or ""."""
     if name == "index":
-        told = pickled_texts(group, "info")
-        return told[told.index("index_name") + 1] if "index_name" in told[:-1] else ""
+        stated = pickled_texts(group, "info")
+        return stated[stated.index("index_name") + 1] if "index_name" in stated[:-1] else ""
     return next(iter(pickled_texts(data, "name")), "") or next(
         (text for text in texts_in(data, "name") if text.isidentifier()), ""
     )

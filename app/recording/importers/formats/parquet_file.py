@@ -117,9 +117,9 @@ def _fields(
         elif types.is_temporal(kind) and not types.is_interval(kind):
             yield inside, "s", not types.is_duration(kind), ""
         elif types.is_floating(kind) or types.is_integer(kind) or types.is_decimal(kind):
-            told = field.metadata or {}
-            unit = next((told[name] for name in _UNITS if name in told), b"")
-            texts = {n.decode("utf-8", "replace"): v for n, v in told.items()}
+            stated = field.metadata or {}
+            unit = next((stated[name] for name in _UNITS if name in stated), b"")
+            texts = {n.decode("utf-8", "replace"): v for n, v in stated.items()}
             yield inside, unit.decode("utf-8", "replace"), False, stated_scale(texts)
 
 

@@ -315,12 +315,12 @@ def scale_of(setting: str, column: str) -> bool:
     return match is not None and column.lower().startswith(match["of"])
 
 
-def stated_scale(told: Mapping[str, object], integers: bool = False) -> str:
+def stated_scale(stated: Mapping[str, object], integers: bool = False) -> str:
     """Return the first scale or offset that stands next to a column, such as "gain = 2", or "".
 
-    ``told`` is what the file says of the column by name; the column has ``integers`` or others.
+    ``stated`` is what the file says of the column by name; the column has ``integers`` or others.
     """
-    for name, value in told.items():
+    for name, value in stated.items():
         plain = re.sub(r"[\s-]+", "_", name.strip().lower())
         plain = plain if plain in _GAINS | _OFFSETS else plain.removesuffix("s")
         neutral = 0.0 if plain in _OFFSETS else 1.0

@@ -83,18 +83,18 @@ class TdmsChannels(StoredColumns):
         self.warnings = _appended(path)
 
     def _stored(self, channel: TdmsChannel, first: TdmsTimestamp | None) -> StoredColumn:
-        told: Mapping[str, object] = channel.properties
+        stated: Mapping[str, object] = channel.properties
         step, unit = _step(channel, self._groups.get(channel.group_name, {}))
-        start, started = _number(told.get("wf_start_offset")), _started(channel)
+        start, started = _number(stated.get("wf_start_offset")), _started(channel)
         if started is not None and first is not None:
             start += _seconds(started, first)
         dates = channel.dtype.kind == "M"
         return StoredColumn(
             _loader(self.path, channel.group_name, channel.name), len(channel), channel.name,
             "s" if dates else unit,
-            "time" if dates else str(told.get("description", "")),
+            "time" if dates else str(stated.get("description", "")),
             printable(channel.group_name), step, start,
-            began=_moment(channel[0]) if dates else None, scaled=stated_scale(told),
+            began=_moment(channel[0]) if dates else None, scaled=stated_scale(stated),
         )  # fmt: skip
 
 
@@ -103,13 +103,13 @@ def _step(channel: TdmsChannel, above: Mapping[str, object]) -> tuple[float | No
 
     ``above`` are the properties of its group and of the file.
     """
-    told: Mapping[str, object] = channel.properties
-    unit = str(told.get("unit_string", told.get("NI_UnitDescription", "")))
-    if (step := _number(told.get("wf_increment"))) > 0.0:
-        along = unit_of(str(told.get("wf_xunit_string", "")) or "s")
+    stated: Mapping[str, object] = channel.properties
+    unit = str(stated.get("unit_string", stated.get("NI_UnitDescription", "")))
+    if (step := _number(stated.get("wf_increment"))) > 0.0:
+        along = unit_of(str(stated.get("wf_xunit_string", "")) or "s")
         scale = UNITS["time"].get(along[0]) if along else None
         return None if scale is None else step * scale.times / scale.over, unit
-    given = {name: _number(value) for name, value in {**above, **told}.items()}
+    given = {name: _number(value) for name, value in {**above, **stated}.items()}
     if any(is_thinned(name, value) for name, value in given.items()):
         return None, unit
     steps = (rate_step(name, value) for name, value in given.items())

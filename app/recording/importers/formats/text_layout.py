@@ -194,8 +194,8 @@ class _Table:
             good = functools.partial(_is_data, strict=strict)
             for at in range(0 if least > 1 else 1, len(places) - least + 1):
                 run = [row(i) for i in range(at, at + least)]
-                beside = run if least > 1 else [row(at - 1), *run]
-                if len({len(cells) for cells in beside}) > 1 or not all(map(good, run)):
+                all_rows = run if least > 1 else [row(at - 1), *run]
+                if len({len(cells) for cells in all_rows}) > 1 or not all(map(good, run)):
                     continue
                 width = len(run[0])
                 # rows with a cell that is not a number may stand first
@@ -341,9 +341,9 @@ class _Table:
     def _labview_units(self, names: Sequence[str]) -> list[str]:
         """Return the units that the head of a LabVIEW file gives, by the place of the column."""
         rows = (self._split(line) for line in range(self.start, self.first))
-        told = iter(next((row for row in rows if row[:1] == ["Y_Unit_Label"]), [""])[1:])
+        stated = iter(next((row for row in rows if row[:1] == ["Y_Unit_Label"]), [""])[1:])
         # where each signal has times of its own, these have no unit there
-        return ["" if name == "X_Value" else next(told, "") for name in names]
+        return ["" if name == "X_Value" else next(stated, "") for name in names]
 
     def _scaled(self, line: int, columns: Sequence[TextColumn]) -> list[TextColumn]:
         """Return ``columns`` with the scales that a line above the numbers gives them.
@@ -502,8 +502,8 @@ class _Table:
         lowered = [name.lower() for name in names]
         if "increment" in lowered and (at := lowered.index("increment")) < len(units):
             return _positive(units[at])
-        told = {row[0]: row[1:] for row in block if len(row) > 1}
-        steps, starts = told.get("Delta_X", ()), told.get("X0", ())
+        stated = {row[0]: row[1:] for row in block if len(row) > 1}
+        steps, starts = stated.get("Delta_X", ()), stated.get("X0", ())
         one = len(set(map(_positive, steps))) == 1 and len(set(starts)) < 2
         return _positive(steps[0]) if self.labview and one else None
 

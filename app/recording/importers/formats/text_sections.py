@@ -107,7 +107,7 @@ def _near(text: str, start: int, end: int, last: bool = False) -> list[str]:
 
 def _title(above: Sequence[str], layout: TextLayout) -> str:
     """Return what the lines ``above`` a table call it; empty if there are none."""
-    told = [line for line in above if line.strip()]
-    line = next((line for line in told if _SPECIMEN.search(line)), told[-1] if told else "")
+    stated = [line for line in above if line.strip()]
+    line = next((line for line in stated if _SPECIMEN.search(line)), stated[-1] if stated else "")
     cells = [cell for cell in cells_of(line, layout.delimiter) if cell] if line else []
     return printable(" ".join(cells))[:TITLE_MAX]

@@ -231,10 +231,10 @@ def label_of(name: str, unit: str = "") -> Label:
             words, found = match["name"], known
             break
     symbol, dimensions = found or ("", ())
-    beside = unit_of(unit) if unit else None
+    of_unit = unit_of(unit) if unit else None
     conflict = ""
-    if found and unit and (beside is None or beside[0] != symbol):
-        conflict = beside[0] if beside else unit
+    if found and unit and (of_unit is None or of_unit[0] != symbol):
+        conflict = of_unit[0] if of_unit else unit
     unknown = "" if found else unit or _unknown_unit(name)
     said = _read(words)
     quantities, raw = said.quantities, ""

@@ -36,7 +36,7 @@ EFFECT = replace(
     parameters=(
         _STRESS,
         _REACH,
-        # a steeper one is hardly told from a threshold
+        # a steeper one cannot be told from a threshold
         replace(_EXPONENT, bounds=(1.0, 6.0), starts=(3.0, 1.5)),
     ),
 )

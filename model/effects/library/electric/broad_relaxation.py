@@ -82,7 +82,7 @@ def polarise(c, k, m, j, start, end, h):
     sharp = math.cos(math.pi * c[k + 2])
     step = 2.0 * c[k + 3] / (_TERMS - 1)
     late, later = c[k + 1] * math.exp(-c[k + 3]), math.exp(step)
-    side, beside = math.exp((1.0 - c[k + 2]) * c[k + 3]), math.exp((c[k + 2] - 1.0) * step)
+    side, ratio = math.exp((1.0 - c[k + 2]) * c[k + 3]), math.exp((c[k + 2] - 1.0) * step)
     for i in range(_TERMS):
         weight = 1.0 / (0.5 * (side + 1.0 / side) - sharp)
         whole += weight
@@ -90,7 +90,7 @@ def polarise(c, k, m, j, start, end, h):
         m[j + i] = lagged(m[j + i], start, end, h, late)
         after += weight * m[j + i]
         late *= later
-        side *= beside
+        side *= ratio
     share = c[k] / (1.0 + c[k + 4] * c[k])
     return (
         share * start * (before / whole - c[k + 4] * start),

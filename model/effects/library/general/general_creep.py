@@ -1,6 +1,6 @@
 """Creep of any form: Maxwell branches on a fixed grid of relaxation times.
 
-Ten branches as in ``slow_branch`` beside the network; each relaxes twice as slowly as the one
+Ten branches as in ``slow_branch`` parallel to the network; each relaxes twice as slowly as the one
 before. Their moduli are the weights. A branch between two nodes is met to (ln 2)^2/32 = 1.5 %.
 """
 

@@ -1,6 +1,6 @@
 """Viscoplastic flow of the film: beyond a threshold, a stress flows with a power of its excess.
 
-A spring in series with a dashpot and a slider side by side (Perzyna), beside the network. The
+A spring in series with a dashpot and a slider side by side (Perzyna), parallel to the network. The
 elastic stretch z obeys z' = lam' -+ u ((|z|/r - s)/(1 - s))^n with u = 0.01/s, and the stress is
 Y z/r: Y is what the element bears while the film is stretched at u. With n = 1 it is Bingham's
 element; with s near 1, or a large n, an ideal yielding one. ``nonlinear_creep`` has no threshold.
