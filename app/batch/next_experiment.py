@@ -53,8 +53,8 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Next
                 NextExperiment(
                     "vary",
                     (column.label,),
-                    f"Vary the {column.label} by {column.least_range:g} {column.unit} and more: it was "
-                    f"within {low:.4g} and {high:.4g} {column.unit}.",
+                    f"Vary the {column.label} by {column.least_range:g} {column.unit} and more: it "
+                    f"was within {low:.4g} and {high:.4g} {column.unit}.",
                 )
             )
     for a, b, r in design.entangled:

@@ -21,7 +21,7 @@ from dearig.clock import TOLERANCE, ClockWatch
 from dearig.output_state import Known, OutputState
 from dearig.window.high_voltage.state import HighVoltage, kilovolts, state_at_rest
 from dearig.window.session.recovery import lock_of, unsaved_folder
-from dearig.window.session.settings import kept_text
+from dearig.window.session.settings import kept_text, write_apart
 from dearig.window.session.state import Session
 
 __all__ = [
@@ -330,10 +330,12 @@ class HighVoltageStatus(QObject):
                 self._session.address,
             )
         )
+        self._session.settings.sync()  # there is no voltage yet, so that it may take its time
 
     def run_ended(self, alarm: LatchedAlarm | None) -> None:
         """Latch ``alarm``; None for a run that ended as it should."""
         self._keep(alarm)
+        write_apart(self._session.settings)  # the program may die in the next moment
         if self._lock is not None:
             self._lock.unlock()
             self._lock = None
@@ -416,7 +418,6 @@ class HighVoltageStatus(QObject):
             self._session.settings.remove(key)
         else:
             self._session.settings.setValue(key, json.dumps(asdict(alarm)))
-            self._session.settings.sync()  # the program may die in the next moment
 
     def _restore(self) -> None:
         """Latch what an earlier start of the program has left: for this rig, else for another."""

@@ -9,13 +9,23 @@ from __future__ import annotations
 import logging
 import os
 import tempfile
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QSettings
+from PySide6.QtCore import QByteArray, QEvent, QObject, QSettings
 
 from dearig.model.compiled.trusted_folder import distrust, distrust_file
 
-__all__ = ["kept_bytes", "kept_number", "kept_text", "kept_texts", "open_settings"]
+__all__ = [
+    "HeldSettings",
+    "kept_bytes",
+    "kept_number",
+    "kept_text",
+    "kept_texts",
+    "open_settings",
+    "write_apart",
+]
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +48,45 @@ def open_settings() -> QSettings:
     log.warning("the settings of the window are not read or kept: %s", reason)
     folder = tempfile.mkdtemp(prefix="dearig-settings-")
     return QSettings(f"{folder}/dearig.ini", QSettings.Format.IniFormat)
+
+
+class HeldSettings(QObject):
+    """Holds changes of settings in memory while ``is_busy``, until ``write``.
+
+    Qt writes them in the interface's thread, and waits until they are on the disk: a slow disk
+    keeps STOP waiting for a tenth of a second and more.
+    """
+
+    def __init__(
+        self, settings: QSettings, is_busy: Callable[[], bool], parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._settings = settings
+        self._is_busy = is_busy
+        self._are_held = False
+        settings.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802, ARG002  (Qt's)
+        """Hold Qt's own event that writes changes."""
+        if event.type() != QEvent.Type.UpdateRequest or not self._is_busy():
+            return False
+        self._are_held = True
+        return True
+
+    def write(self) -> None:
+        """Write what was held, unless ``is_busy``."""
+        if self._are_held and not self._is_busy():
+            self._are_held = False
+            self._settings.sync()
+
+
+def write_apart(settings: QSettings) -> threading.Thread:
+    """Write all changes of ``settings`` in a thread of its own, which is returned."""
+    place = settings.fileName(), settings.format()
+    # objects with the same file share what is not written yet
+    thread = threading.Thread(target=lambda: QSettings(*place).sync(), name="settings")
+    thread.start()
+    return thread
 
 
 def _value(settings: QSettings, key: str) -> object:

@@ -22,7 +22,7 @@ from dearig.model.simulation.actuator import Actuator
 from dearig.window.jobs.program_errors import ProgramErrors
 from dearig.window.kit.theme import LIGHT, Theme
 from dearig.window.session.recovery import Recovery
-from dearig.window.session.settings import kept_text, kept_texts
+from dearig.window.session.settings import HeldSettings, kept_text, kept_texts
 
 __all__ = ["ArmingBlock", "Breach", "Preview", "Session"]
 
@@ -147,6 +147,7 @@ class Session(QObject):
         self._feedforward = ""  # text of the sequence of the last hold
         self._hold: tuple[HoldPlan, tuple[object, ...]] | None = None
         self._blocks: dict[str, ArmingBlock] = {}
+        self._held = HeldSettings(settings, lambda: self.busy, self)
         self.recovery = Recovery(settings, self)  #: unsaved sequence and rig file
 
     def set_address(self, address: str) -> None:
@@ -292,12 +293,14 @@ class Session(QObject):
         if running != self.running:
             self.running = running
             self.running_changed.emit(running)
+            self._held.write()
 
     def set_armed(self, armed: bool) -> None:
         """Say that the rig was armed or disarmed."""
         if armed != self.armed:
             self.armed = armed
             self.armed_changed.emit(armed)
+            self._held.write()
 
     @property
     def busy(self) -> bool:

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from dearig.window.kit.theme import LIGHT, prepare_plots
-from dearig.window.session.settings import kept_texts, open_settings
+from dearig.window.session.settings import kept_texts, open_settings, write_apart
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from tests.deep import mostly_deep
@@ -68,6 +69,38 @@ def test_what_was_kept_comes_back(tmp_path: Path, qtbot: QtBot) -> None:
     assert (found.operator, found.film) == ("Ada, Lovelace", "film 3")
     assert found.recent == [tmp_path / "b.toml", tmp_path / "a.toml"]
     assert kept_texts(again, "recent", 1) == [str(tmp_path / "b.toml")]
+
+
+def test_nothing_is_written_to_the_disk_while_stop_must_be_heard(
+    tmp_path: Path, qtbot: QtBot
+) -> None:
+    ini = tmp_path / "dearig.ini"
+    session = Session(tmp_path, QSettings(str(ini), QSettings.Format.IniFormat), theme=LIGHT)
+    session.settings.setValue("page", 1)
+    qtbot.waitUntil(ini.exists)
+    before = ini.read_bytes()
+    session.set_armed(True)
+    session.settings.setValue("page", 2)
+    QApplication.processEvents()
+    session.set_running(True)
+    session.set_armed(False)
+    session.settings.setValue("page", 3)
+    QApplication.processEvents()
+    assert ini.read_bytes() == before
+    assert session.settings.value("page") == 3
+    session.set_running(False)
+    assert b"page=3" in ini.read_bytes()
+    session.settings.setValue("page", 4)
+    qtbot.waitUntil(lambda: b"page=4" in ini.read_bytes())
+
+
+def test_settings_are_written_in_a_thread_of_their_own(tmp_path: Path, qtbot: QtBot) -> None:
+    ini = tmp_path / "dearig.ini"
+    session = Session(tmp_path, QSettings(str(ini), QSettings.Format.IniFormat), theme=LIGHT)
+    session.set_armed(True)
+    session.settings.setValue("alarm", "arc")
+    write_apart(session.settings).join()
+    assert b"alarm=arc" in ini.read_bytes()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="settings are in the registry")
