@@ -108,10 +108,10 @@ class Regression:
     """The regression of ``records`` about a fitted ``model``, whose effects stay as they are.
 
     ``times`` is the range of relaxation times in s, ``drift`` the variance of the records' drift in
-    units of a reading's noise; the most probable drift ``mean_drift_m`` (N,) in m is subtracted. ``local``
-    are the derivative (N, f) of the model's readings with respect to its free coordinates, and its
-    residuals (N,), model less measured, both over the noise: by them the parent's springs follow an
-    effect that is small (a Gauss-Newton step).
+    units of a reading's noise; the most probable drift ``mean_drift_m`` (N,) in m is subtracted.
+    ``local`` are the derivative (N, f) of the model's readings with respect to its free
+    coordinates, and its residuals (N,), model less measured, both over the noise: by them the
+    parent's springs follow an effect that is small (a Gauss-Newton step).
     """
 
     def __init__(

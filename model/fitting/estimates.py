@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import count
 
 import numpy as np
@@ -21,7 +22,7 @@ from dearig.model.fitting.intervals import (
 from dearig.model.fitting.levenberg import descend, gain_that_counts
 from dearig.model.fitting.parameters import NORMAL_95, Estimate, FitLayout, FreeParameter
 from dearig.model.fitting.problem import Problem
-from dearig.model.fitting.spare import Optimum, sums_of_weak, valleys_of, widened
+from dearig.model.fitting.spare import Optimum, has_spare, sums_of_weak, valleys_of, widened
 from dearig.model.readings.records import ActuatorRecord, FilmRecord
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "AT_STATED_BOUND",
     "BY_CURVATURE",
     "MOVES_MAX",
+    "ONE_VALLEY",
     "BetterPoint",
     "Intervals",
     "at_bound",
@@ -46,6 +48,8 @@ AT_STATED_BOUND = "at its stated bound"
 
 #: Note of an interval whose profile was not followed.
 BY_CURVATURE = "from the curvature at the optimum: the profile was not followed to its end"
+#: Note of an interval where other fits may be as good.
+ONE_VALLEY = "about this optimum alone: others that may be as good were not all followed"
 
 #: Moves of an optimum to better points that profiles come to; what gains goes on.
 MOVES_MAX = 3
@@ -164,10 +168,15 @@ def estimates_with_intervals(
     estimates.sort(key=lambda e: layout.names.index(e.name))
     sums: tuple[Estimate, ...] = ()
     on = best if finer is None else replace(best, problem=finer[0])
-    valleys = None if ended() else valleys_of(on, estimates)
     tick = _ticks(report, ended, layout.size, shares)
-    if valleys is not None:
-        estimates, sums = widened(valleys, estimates, tick, _Ended)
+    if has_spare(layout, estimates):
+        try:
+            valleys = valleys_of(on, estimates, partial(_end_if, ended))
+            estimates, sums = widened(valleys, estimates, tick, _Ended)
+        except _Ended:
+            pass  # the notes say so
+        if ended():
+            estimates = [_without_valleys(e) for e in estimates]
     if not ended():
         sums = sums_of_weak(best, jac, estimates, sums, tick, _Ended)
     names = tuple(n for n, h in zip(layout.names, held, strict=True) if not h)
@@ -212,6 +221,18 @@ def _ticks(
             raise _Ended
 
     return tick
+
+
+def _end_if(ended: Callable[[], bool]) -> None:
+    if ended():
+        raise _Ended
+
+
+def _without_valleys(e: Estimate) -> Estimate:
+    """Return ``e`` with the note that other valleys were not followed to their ends."""
+    if not e.free or not e.determined:
+        return e
+    return replace(e, note=f"{e.note}; {ONE_VALLEY}" if e.note else ONE_VALLEY)
 
 
 def _estimate(

@@ -38,6 +38,7 @@ __all__ = [
     "SPARE",
     "Optimum",
     "Valleys",
+    "has_spare",
     "sums_of_weak",
     "sums_text",
     "valleys_of",
@@ -216,20 +217,32 @@ def _time(layout: FitLayout, branch: int) -> int:
     return _columns(layout, branch)["T", 0]
 
 
-def valleys_of(best: Optimum, estimates: Sequence[Estimate]) -> Valleys | None:
-    """Return the valleys as good as ``best``, None where every branch is fixed.
+def has_spare(layout: FitLayout, estimates: Sequence[Estimate]) -> bool:
+    """Return True where ``estimates`` do not determine every branch, and one of them is firm."""
+    return all(_spare_and_firm(layout, estimates))
+
+
+def valleys_of(best: Optimum, estimates: Sequence[Estimate], check: Callable[[], None]) -> Valleys:
+    """Return the valleys as good as ``best``, where ``has_spare``.
 
     As good is what a 95 % interval allows. ``estimates`` have the intervals in the valley of
-    ``best``. Raises ``BetterPoint`` for a valley that is better.
+    ``best``. ``check`` is called after each population of simulations, from any thread, and may
+    raise. Raises ``BetterPoint`` for a valley that is better.
     """
     layout = best.problem.layout
     spare, firm = _spare_and_firm(layout, estimates)
-    if not spare or not firm:
-        return None
     alone = Valleys(best, spare, firm, {})
 
     def followed(start: tuple[np.ndarray, tuple[int, ...]]) -> LocalFit:
         problem = copy(best.problem)  # counts its simulations on its own
+        counted = problem.on_simulations
+
+        def on_simulations(count: int, cost: float) -> None:
+            if counted is not None:
+                counted(count, cost)
+            check()
+
+        problem.on_simulations = on_simulations
         x, without = start
         enough = _GAIN * best.threshold
         return descend(problem, x, _held(best, without), _ITERATIONS, enough, quick=False)

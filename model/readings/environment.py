@@ -74,6 +74,6 @@ def air_texts(
             )
         elif max(known) - min(known) < least:
             yield (
-                f"the room's {what} differs too little between the recordings ({low:.1f} to {high:.1f} "
-                f"{unit}): they cannot show what the film owes to it"
+                f"the room's {what} differs too little between the recordings ({low:.1f} to "
+                f"{high:.1f} {unit}): they cannot show what the film owes to it"
             )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pyqtgraph as pg
@@ -15,6 +17,7 @@ from dearig.model.residual import Dependence, MissingStress
 from dearig.units import SHOWN, readable
 from dearig.window.kit.flow import Flow
 from dearig.window.kit.theme import SPACE
+from dearig.window.kit.turns import Turns
 from dearig.window.kit.widgets import label, name_list
 from dearig.window.plots.area import PlotArea
 from dearig.window.plots.plot import LegendEntry
@@ -33,6 +36,7 @@ class ResidualPlots(QWidget):
         super().__init__(parent)
         self._session = session
         self._residuals: tuple[Residual, ...] = ()
+        self._turns = Turns(lambda: session.busy, self)
         self.record = name_list()
         self.record.setToolTip("Recording whose residual is shown")
         self.quantity = name_list()
@@ -104,8 +108,9 @@ class ResidualPlots(QWidget):
 
     @Slot()
     def _draw(self) -> None:
-        plots = (*self.time, self.density, self.dependence, self.missing)
-        for plot in plots:
+        """Draw what is chosen; while the rig is busy, one plot after another."""
+        self._turns.clear()
+        for plot in (*self.time, self.density, self.dependence, self.missing):
             plot.clear_all()
         found = self._found()
         self.area.show_plot(self.dependence, found is None or bool(found.dependences))
@@ -114,15 +119,18 @@ class ResidualPlots(QWidget):
             self.remarks.setText("")
             return
         self.remarks.setText(readable(". ".join(w[:1].upper() + w[1:] for w in found.words)))
-        self._over_time(found)
-        self._over_frequency(found)
+        self.area.file_stem = f"{found.name} residual"
+        pieces: list[Callable[[], object]] = [
+            partial(self._over_time, found),
+            partial(self._over_frequency, found),
+        ]
         last = min(self.stand.currentIndex(), len(found.over_time) - 1)
         if found.dependences:
-            self._against(found.dependences[last], found.kind)
+            pieces.append(partial(self._against, found.dependences[last], found.kind))
         if found.missing:
-            self._stress(found.missing[min(last, len(found.missing) - 1)], found.kind)
-        self.area.file_stem = f"{found.name} residual"
-        self.area.auto_range()
+            shown = found.missing[min(last, len(found.missing) - 1)]
+            pieces.append(partial(self._stress, shown, found.kind))
+        self._turns.add([*pieces, self.area.auto_range])
 
     def _models(self, count: int) -> list[tuple[str, str]]:
         """Return names and colours of ``count`` models."""

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
 
 from dearig.model.film.material import Network
 from dearig.model.fitting import Estimate, Identification, identify
-from dearig.model.fitting.spare import _together
+from dearig.model.fitting.estimates import ONE_VALLEY, estimates_with_intervals
+from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.spare import Optimum, Valleys, _together, valleys_of
 from dearig.report.as_json import outcome_json
 from dearig.report.text.estimates import estimate_table
 from dearig.report.text.numbers import symbol
 from dearig.report.text.tables import parameter_table
 from tests.deep import mostly_deep
 from tests.tools.diagnosis import stage
-from tests.tools.engine import PLAIN, record_of, thesis_drive
+from tests.tools.engine import PLAIN, posed, record_of, thesis_drive
 from tests.tools.reports import fit as paper_fit
 from tests.tools.reports import identify_outcome
+
+Check = Callable[[], None]
 
 #: Two branches at 0.462 and 0.470 s: a single one of 104.51 kPa leaves the same error.
 TWINS = replace(PLAIN, network=Network.gent((50e3, 46.84e3, 57.67e3), (1e4,) * 3, (0.462, 0.470)))
@@ -96,3 +101,31 @@ def test_a_limit_that_is_held_stays_where_it_is() -> None:
         assert fit.held_limits == ("J_0", "J_1")
         limits = {e.name: e.value for e in fit.estimates if e.name in fit.held_limits}
         assert limits == pytest.approx({"J_0": 1e4, "J_1": 1e4})
+
+
+def test_other_valleys_are_left_when_they_are_asked_to_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    record = record_of(TWINS, thesis_drive(rate=50.0))
+    problem, x, free = posed(TWINS, record)
+    found = descend(problem, x, ~free)
+    after: list[int] = []
+
+    def follow(best: Optimum, estimates: Sequence[Estimate], check: Check) -> Valleys:
+        best.problem.on_simulations = lambda count, _: after.append(count)
+        return valleys_of(best, estimates, check)
+
+    monkeypatch.setattr("dearig.model.fitting.estimates.valleys_of", follow)
+    intervals = estimates_with_intervals(
+        problem,
+        problem.layout.values(found.x),
+        ~free,
+        lambda _: None,
+        lower_ends=False,
+        ended=lambda: bool(after),
+    )
+    # the first population that is simulated on the way to another valley is the last
+    assert len(after) == 1
+    (known,) = (e for e in intervals.estimates if e.name == "mu_0")
+    assert known.determined
+    assert ONE_VALLEY in known.note
