@@ -63,6 +63,7 @@ _SCALE = 0.2  # of the gain of a voltage monitor: no amplifier loses as much
 _SHOWS = 25.0  # of chi-square, above that of as many numbers: five standard deviations
 _FUNCTIONS = 7  # of the voltage, that stand for any effect: five powers and two differences
 _KEPT = 256  # predictions that are kept
+_ALIKE = 1e-12  # of the square of a column, below which all that it has of its own is rounding
 
 _HOOKS = ("supply", "polarise", "permittivity", "charge", "conduct", "drop")
 
@@ -256,11 +257,11 @@ class _Channel:
         predicted = self._away(rows[self._row] / self.noise)
         left, drop = self._left - predicted, rows[loop.DROP]
         if self.name != CURRENT or not drop.any():
-            return self._solved([predicted], left)[1]
+            return self._solved(predicted, left)[1]
         dropped = self._away(drop / self.noise)
-        found, residual = self._solved([predicted, dropped], left)
-        if found[-1] < self._least:
-            return self._solved([predicted], left - self._least * dropped)[1]
+        conductance, residual = self._solved(predicted, left, dropped)
+        if conductance < self._least:
+            return self._solved(predicted, left - self._least * dropped)[1]
         return residual
 
     def _away(self, values: np.ndarray) -> np.ndarray:
@@ -268,20 +269,29 @@ class _Channel:
         return np.asarray(values - self._free @ (self._free.T @ values))
 
     def _solved(
-        self, columns: Sequence[np.ndarray], left: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the unknowns of ``columns``, and the residual (M + 1,) of ``left`` (M,).
+        self, predicted: np.ndarray, left: np.ndarray, dropped: np.ndarray | None = None
+    ) -> tuple[float, np.ndarray]:
+        """Return the conductance of ``dropped``, and the residual (M + 1,) of ``left`` (M,).
 
-        The first is the gain's deviation from 1, with its prior. All are in noises, and orthogonal
-        to what is free.
+        The other unknown is the gain's deviation from 1, with its prior: the factor of
+        ``predicted``. All (M,) are in noises, and orthogonal to what is free.
         """
-        matrix = np.transpose(columns)
-        inside = matrix.T @ matrix
-        inside[0, 0] += self._gain_error**-2
-        scale = np.sqrt(np.maximum(np.diagonal(inside), 1e-300))
-        normal = inside / np.outer(scale, scale)
-        found = np.linalg.lstsq(normal, (matrix.T @ left) / scale, rcond=1e-12)[0] / scale
-        return found, np.append(left - matrix @ found, -found[0] / self._gain_error)
+        inside = float(predicted @ predicted) + self._gain_error**-2
+        gain, conductance = float(predicted @ left) / inside, 0.0
+        if dropped is not None:
+            # the gain is eliminated from the normal equations
+            shared, size = float(predicted @ dropped) / inside, float(dropped @ dropped)
+            own = size - shared**2 * inside
+            if own > _ALIKE * size:
+                conductance = (float(dropped @ left) - shared * gain * inside) / own
+            gain -= shared * conductance
+        residual = np.empty(left.size + 1)
+        np.multiply(predicted, -gain, out=residual[:-1])
+        residual[:-1] += left
+        if dropped is not None:
+            residual[:-1] -= conductance * dropped
+        residual[-1] = -gain / self._gain_error
+        return conductance, residual
 
     # -- whether it can be used
 

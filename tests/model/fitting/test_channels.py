@@ -231,3 +231,23 @@ def test_effects_of_the_springs_and_the_sensor_are_not_electric():
     assert is_electric("field-dependent permittivity")
     assert not is_electric("linear drag")
     assert not is_electric("sensor lag")
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.999, 1.0 - 1e-7])
+def test_gain_and_conductance_are_those_of_least_squares(alike):
+    (channel,) = (x for x in Channels([record()], PLAIN)._channels if x.name == CURRENT)
+    rng = np.random.default_rng(5)
+    predicted, other, noise = rng.standard_normal((3, channel.y.size))
+    dropped = alike * predicted + np.sqrt(1.0 - alike**2) * other
+    left = noise + 0.3 * predicted + 0.2 * other
+    gain_error = channel._gain_error
+    matrix = np.vstack([np.transpose([predicted, dropped]), [1.0 / gain_error, 0.0]])
+    target = np.append(left, 0.0)
+    both = np.linalg.lstsq(matrix, target)[0]
+    conductance, residual = channel._solved(predicted, left, dropped)
+    assert conductance == pytest.approx(both[1], rel=1e-6)
+    np.testing.assert_allclose(residual, target - matrix @ both, atol=1e-8)
+    gain = np.linalg.lstsq(matrix[:, :1], target)[0]
+    np.testing.assert_allclose(
+        channel._solved(predicted, left)[1], target - matrix[:, :1] @ gain, atol=1e-12
+    )
