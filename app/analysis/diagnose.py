@@ -33,6 +33,12 @@ from dearig.analysis.readings.compatibility import (
     check_branches,
 )
 from dearig.analysis.readings.enough import check_enough, extrapolated, few_data
+from dearig.analysis.readings.events import (
+    own_of_each,
+    recurring_events,
+    with_events,
+    without_own,
+)
 from dearig.analysis.readings.opening import Source, check_named_once
 from dearig.analysis.readings.record import Readings, noise_texts, read_all, recordings_of
 from dearig.analysis.readings.room import air_texts_of, room_texts
@@ -50,13 +56,12 @@ from dearig.errors import (
     SafetyStop,
 )
 from dearig.model.diagnosis import diagnose
-from dearig.model.diagnosis.events import Own, drifts_at_rest, own_of
+from dearig.model.diagnosis.events import OneTimeEvent, Own
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
 from dearig.model.fitting import Constraint, GivenValue
 from dearig.model.fitting.parameters import NORMAL_95
 from dearig.model.fitting.prediction import prediction_gain
-from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
 from dearig.model.simulation.strip import Strip
 from dearig.model.verdict import PARTLY_EXPLAINED, UNEXPLAINED
@@ -397,24 +402,7 @@ def _outcome(
     if finding.held:
         fitted, others = ([each.held() for each in some] for some in (fitted, others))
     failed: list[str] = []
-    models = [finding.baseline, *(s.stage for s in finding.steps[:-1]), finding.final]
-    stands = tuple(
-        Evaluation(
-            tuple(name for name, _ in stage.model.effects),
-            _compared(fitted, stage.of_each(len(fitted)), "train", failed),
-            _compared(others, [stage.predicting] * len(others), "validation", failed),
-        )
-        for stage in models
-    )
-    found = models[-1].predicting
-    # that the reading drifts is for the training recordings to show: alone in another one, what is
-    # slow may be a law that they do not show
-    drifts = any(step.family == "drift" for step in finding.steps)
-    own = _own((*fitted, *others), found, drifts)
-    stands = tuple(
-        _without_own(stand, own) if stage.predicting == found else stand
-        for stand, stage in zip(stands, models, strict=True)
-    )
+    finding, stands, own, recurring = _evaluated(fitted, others, finding, failed)
     noise = _noise(fitted)
     stands = (*stands[:-1], judged_with_bands(stands[-1], others, finding.final, {}))
     seconds = clock() - started
@@ -424,6 +412,7 @@ def _outcome(
     effects = ", ".join(name for name, _ in finding.final.predicting.effects)
     name = f"{title}, with {effects}" if effects else f"{title}, nothing added"
     compared = {c.name for c in stands[-1].validation}
+    may_recur = bool(recurring) or any(s.may_recur for s in finding.steps)
     outcome = DiagnoseOutcome(
         title=title,
         kind=recordings[0].kind,
@@ -448,7 +437,8 @@ def _outcome(
             NORMAL_95 * c.band.parameters_rms for c in stands[-1].validation if c.band is not None
         ),
         # what happened in the training recordings alone is for no other recording to confirm
-        gain=_gain(stands, own, noise) if any(s.may_recur for s in finding.steps) else None,
+        gain=_gain(stands, own, noise) if may_recur else None,
+        recurring=recurring,
     )
     outcome = with_excitation(outcome, settings.rig)
     if outcome.kind == "actuator":
@@ -464,6 +454,42 @@ def _outcome(
     judged[place] = judged_with_bands(judged[place], others, stage, history)
     model = replace(outcome.model, history=history)
     return replace(outcome, model=model, stands=tuple(judged))
+
+
+def _evaluated(
+    fitted: Sequence[Readings], others: Sequence[Readings], finding: Diagnosis, failed: list[str]
+) -> tuple[Diagnosis, tuple[Evaluation, ...], dict[str, Own | None], tuple[OneTimeEvent, ...]]:
+    """Return each model on all recordings, what is the own of each, and what comes with each run.
+
+    With the finding, whose final model predicts with what comes with each run. ``failed`` receives
+    sentences on models that cannot follow a recording.
+    """
+    models = [finding.baseline, *(s.stage for s in finding.steps[:-1]), finding.final]
+    stands = tuple(
+        Evaluation(
+            tuple(name for name, _ in stage.model.effects),
+            _compared(fitted, stage.of_each(len(fitted)), "train", failed),
+            _compared(others, [stage.predicting] * len(others), "validation", failed),
+        )
+        for stage in models
+    )
+    found = models[-1].predicting
+    # that the reading drifts is for the training recordings to show: alone in another one, what is
+    # slow may be a law that they do not show
+    drifts = any(step.family == "drift" for step in finding.steps)
+    own = own_of_each((*fitted, *others), found, drifts)
+    recurring = recurring_events(own, finding)
+    if recurring:
+        finding = replace(finding, final=with_events(finding.final, recurring))
+        models[-1], found = finding.final, finding.final.predicting
+        again = _compared(others, [found] * len(others), "validation", failed)
+        stands = (*stands[:-1], replace(stands[-1], validation=again))
+        own = own_of_each((*fitted, *others), found, drifts)
+    stands = tuple(
+        without_own(stand, own) if stage.predicting == found else stand
+        for stand, stage in zip(stands, models, strict=True)
+    )
+    return finding, stands, own, recurring
 
 
 def _title(recordings: Sequence[Recording]) -> str:
@@ -482,39 +508,6 @@ def _compared(
             # a long search must not be lost because a model cannot follow one drive
             failed.append(f"{each.name} is left out of the {role} errors: {error}")
     return tuple(found)
-
-
-def _own(readings: Sequence[Readings], model: Any, may_drift: bool) -> dict[str, Own | None]:
-    """Return the events and the drift of each of ``readings``; None without any, and of films."""
-    records = {each.name: each.record for each in readings}
-    rigs = [r for r in records.values() if isinstance(r, ActuatorRecord)]
-    # of all recordings together: what is slow in each, and begins with its voltage, is a law
-    may_drift = may_drift and isinstance(model, Actuator) and drifts_at_rest(rigs, model)
-
-    def of(name: str) -> Own | None:
-        record = records[name]
-        if not (isinstance(record, ActuatorRecord) and isinstance(model, Actuator)):
-            return None
-        others = [r for other, r in records.items() if other != name]
-        return own_of(record, model, may_drift=may_drift, others=others)
-
-    return {name: of(name) for name in records}
-
-
-def _without_own(stand: Evaluation, own: dict[str, Own | None]) -> Evaluation:
-    """Return ``stand`` with each recording's events, and what they leave of untouched ones."""
-
-    def of(comparison: Comparison) -> Comparison:
-        found = own[comparison.name]
-        if found is None:
-            return comparison
-        # the model of a training recording contains its events already
-        left = found.rms if comparison.role == "validation" else None
-        return replace(comparison, events=found.events, rms_without_events=left)
-
-    return replace(
-        stand, train=tuple(map(of, stand.train)), validation=tuple(map(of, stand.validation))
-    )
 
 
 def _gain(stands: Sequence[Evaluation], own: dict[str, Own | None], noise: float) -> float | None:

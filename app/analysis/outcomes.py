@@ -329,7 +329,8 @@ class DiagnoseOutcome:
     follow one of them. ``excitation`` is what each validation recording asks beyond the training
     recordings, ``tested`` how far all of them test the model (() and None of films);
     ``determining`` would show what is not determined, None where nothing asks for it or no sequence
-    does. ``seconds`` is the computing time.
+    does. ``recurring`` are events that all recordings have at one moment, so that predictions have
+    them. ``seconds`` is the computing time.
     """
 
     title: str
@@ -352,6 +353,7 @@ class DiagnoseOutcome:
     assumed: str = ""
     prediction_errors: tuple[float, ...] = ()
     gain: float | None = None
+    recurring: tuple[OneTimeEvent, ...] = ()
     excitation: tuple[Excitation, ...] = ()
     tested: Tested | None = None
     determining: DeterminingRecord | None = None

@@ -311,6 +311,10 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             for c in (*after.train, *after.validation)
             for e in c.events
         ],
+        "recurring_events": [
+            {"kind": e.kind, "at_s": finite(e.time), "size": finite(e.size), "unit": e.unit}
+            for e in outcome.recurring
+        ],
         "families": [
             {
                 "family": f,

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
+from dearig.analysis.readings.events import of_each_run
 from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, TOLERANCE
 from dearig.report.text.excitation import tested_texts, undetermined_texts
 from dearig.report.text.laws import place_text
@@ -427,30 +428,20 @@ def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
                 f"{significant(c.rms_without_events * shown.error_factor)} {shown.error_unit} RMS."
             )
         yield f"In {c.name} there is {what}: other recordings are predicted without it.{left}"
-    yield from _events_of_each_run((*outcome.after.train, *outcome.after.validation))
+    yield from _events_of_each_run(outcome)
 
 
-_SAME_MOMENT = 0.02  # s: times of events are stated to a hundredth
-
-
-def _events_of_each_run(comparisons: Sequence[Comparison]) -> Iterator[str]:
+def _events_of_each_run(outcome: DiagnoseOutcome) -> Iterator[str]:
     """Yield a sentence on each event that all of several recordings have at the same moment."""
-    found = sorted((e.kind, e.time, c.name) for c in comparisons for e in c.events)
-    groups: list[list[tuple[str, float, str]]] = []
-    for event in found:
-        last = groups[-1][-1] if groups else ("", 0.0, "")
-        if event[0] == last[0] and event[1] - last[1] < _SAME_MOMENT:
-            groups[-1].append(event)
-        else:
-            groups.append([event])
-    for group in groups:
-        names = dict.fromkeys(name for _, _, name in group)
-        if len(names) == len(comparisons) > 1:
-            kind, time, _ = group[0]
-            yield (
-                f"The {kind} at {time:.2f} s is in {listed(names)} alike, so it comes with each "
-                f"run and did not happen once: look for what the rig does at that moment."
-            )
+    comparisons = (*outcome.after.train, *outcome.after.validation)
+    others = of_each_run({c.name: c.events for c in comparisons})
+    for event in (*outcome.recurring, *others):
+        has = ", and predictions have it" if event in outcome.recurring else ""
+        yield (
+            f"The {event.kind} at {event.time:.2f} s is in {listed(c.name for c in comparisons)} "
+            f"alike, so it comes with each run and did not happen once{has}: look for what the rig "
+            f"does at that moment."
+        )
 
 
 def _rivals_text(step: Step, denials: Sequence[Denial]) -> str:

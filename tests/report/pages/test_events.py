@@ -39,3 +39,15 @@ def test_an_event_at_one_moment_of_all_recordings_did_not_happen_once(later, ali
     said = " ".join(summary(replace(outcome, stands=(*outcome.stands[:-1], after))))
     told = f"at 4.20 s is in {train.name}, {first.name} and {last.name} alike, so it comes with"
     assert (told in said) == alike
+
+
+def test_what_comes_with_each_run_is_in_the_predictions_and_said_to_be():
+    outcome = diagnose_outcome()
+    event = OneTimeEvent("sudden loss of field", 9.24, 5e-3, "")
+    outcome = replace(outcome, recurring=(event,))
+    said = " ".join(summary(outcome))
+    assert "The sudden loss of field at 9.24 s is in " in said
+    assert "did not happen once, and predictions have it" in said
+    assert "predicted without it" not in said
+    (stored,) = diagnosis_json(outcome)["recurring_events"]
+    assert (stored["kind"], stored["at_s"]) == ("sudden loss of field", 9.24)
