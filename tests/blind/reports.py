@@ -151,9 +151,8 @@ def _stripped(path: Path, folder: Path) -> Path:
     table = path.with_suffix(".csv")
     _run(folder, "export", str(path), "--to", "csv", "--out", str(table))
     columns = pandas.read_csv(table, comment="#")
-    kept = [c for c in columns if c.startswith(("time", "voltage_command", "displacement_m"))]
     bare = path.with_name(f"{path.stem}-bare.csv")
-    columns[kept].rename(columns={"voltage_command_V": "voltage_V"}).to_csv(bare, index=False)
+    columns[["time_s", "voltage_V", "displacement_m"]].to_csv(bare, index=False)
     out = bare.with_suffix(".h5")
     _run(folder, "import", str(bare), "--out", str(out))
     return out
