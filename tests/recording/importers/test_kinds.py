@@ -268,6 +268,23 @@ def test_names_are_understood(name: str, quantities: tuple[str, ...], unit: str)
     assert (label.quantities, label.unit) == (quantities, unit)
 
 
+@pytest.mark.parametrize("name", ["Channel A", "Kanal A", "Ch A", "Input C", "Probe A"])
+def test_the_letter_of_a_channel_is_no_unit_where_the_file_gives_one(name: str) -> None:
+    assert (label_of(name, "V").unit, label_of(name, "V").conflict) == ("V", "")
+
+
+@pytest.mark.parametrize("name", ["Force (mN)", "Load (N)", "Blocked force (N)", "Kraft [mN]"])
+def test_the_force_of_a_blocked_film_is_refused_whatever_it_is_called(
+    tmp_path: Path, name: str
+) -> None:
+    text = f"Time (s),Voltage (kV),{name}\n" + "".join(
+        f"{0.1 * i},{i % 5},{i}\n" for i in range(60)
+    )
+    (tmp_path / "in.csv").write_text(text, "utf-8")
+    with refused("the force of a blocked film is not modelled here"):
+        import_file(tmp_path / "in.csv", tmp_path / "out.h5")
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     value=st.floats(-1e6, 1e6),

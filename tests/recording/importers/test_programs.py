@@ -125,6 +125,28 @@ def test_thousands_that_come_after_the_lines_that_are_looked_at(
     assert any("stands between thousands" in note for note in done.notes)
 
 
+def test_thousands_of_the_first_column_come_after_those_lines_too(tmp_path: Path) -> None:
+    moved = np.maximum(RISE - 5.0, 0.0) + 100.0  # um, at rest
+    text = "Weg (um);Spannung (V);Zeit (ms)\n"
+    text += rows(grouped(moved, 0, ".", ","), [f"{v:.0f}" for v in RISE], LONG, separator=";")
+    (tmp_path / "in.csv").write_text(text + "\n", "utf-8")
+    imported(tmp_path / "in.csv")
+    run = open_recording(tmp_path / "out.h5")
+    np.testing.assert_allclose(run.displacement, (moved - 100.0) * 1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("last", ["", ","])
+def test_start_and_increment_of_an_oscilloscope_stand_below_the_names(
+    tmp_path: Path, last: str
+) -> None:
+    text = f"X,CH1,CH2,Start,Increment{last}\nSequence,Volt,Volt,0.5,1.0e-02{last}\n"
+    text += "".join(f"{i},{v:.4g},{d:.4g},{last}\n" for i, (v, d) in enumerate(TABLE[:, 1:3]))
+    (tmp_path / "in.csv").write_text(text, "utf-8")
+    columns = {"voltage_V": "CH1*1000", "displacement_mm": "CH2*1"}
+    run = taken(tmp_path / "in.csv", columns=columns)
+    np.testing.assert_allclose(np.diff(run.time), 1e-2)
+
+
 @pytest.mark.parametrize("cells", [["0", "5", "7.5"], ["1", "1.001", "1.01"], ["999", "1000.5"]])
 def test_points_before_decimals_stay_so(tmp_path: Path, cells: list[str]) -> None:
     moved = ["0"] * (1600 - len(cells)) + cells

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from dearig.errors import InputError, Note
-from dearig.recording.importers.columns.chosen import Chosen, Pick
+from dearig.recording.importers.columns.chosen import Chosen, Pick, label_in
 from dearig.recording.importers.columns.guess import LENGTHS, PULLS
 from dearig.recording.importers.columns.markers import markers_in
 from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
@@ -31,6 +31,7 @@ from dearig.recording.importers.source import (
     listing,
     skip_or_refuse,
 )
+from dearig.units import counted
 
 __all__ = ["Values", "values_of"]
 
@@ -146,7 +147,7 @@ def _kind(chosen: Chosen) -> str:
             f"voltage, film data by stretch; import a file with the columns of one"
         )
     if "voltage" in there:
-        if "displacement" not in there and "force" in there:
+        if "displacement" not in there and _measures_force(chosen):
             raise InputError(
                 f"{path} has voltage and force and no displacement: the force of a blocked film is "
                 f"not modelled here; actuator data need the displacement"
@@ -160,6 +161,13 @@ def _kind(chosen: Chosen) -> str:
         f"{names_of('force')}); there are: {listing(chosen.source.names)}"
         f"{suggestion(['voltage_kV', 'stretch'], chosen.source.names)}"
     )
+
+
+def _measures_force(chosen: Chosen) -> bool:
+    """Whether a column is a force by its name or its label, and none may be the displacement."""
+    labels = [label_in(chosen.source, name) for name in chosen.source.names]
+    named = {q for label in labels for q in (*label.quantities, *label.asked, label.raw)}
+    return "force" in {*named, *chosen.picked} and "displacement" not in named
 
 
 def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[str, str]:
@@ -513,7 +521,8 @@ def _note_left_out(chosen: Chosen, values: Values, good: np.ndarray) -> None:
         values.left.setdefault(sample, []).append(where)
     count = len(skipped) + int((~good).sum())
     if count:
-        values.warnings.append(f"{count} rows were left out because they could not be used")
+        were = "was left out because it" if count == 1 else "were left out because they"
+        values.warnings.append(f"{counted(count, 'row')} {were} could not be used")
 
 
 _LISTED = 100  # rows whose places are looked up

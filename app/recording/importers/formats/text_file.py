@@ -287,6 +287,8 @@ class TextFile(NamedColumns[TextColumn]):
         last = max(column.place, column.date_place or 0)
         for _, block in self._blocks():
             for line in block.decode("utf-8", "replace").split("\n"):
+                if not holds_data(line):  # an empty line has an empty first cell
+                    continue
                 try:
                     cells = cells_of(line, self.layout.delimiter)
                 except csv.Error:

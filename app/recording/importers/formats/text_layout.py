@@ -275,6 +275,8 @@ class _Table:
         if not above:
             return -1, [], []
         cells = self._split(above[0])
+        if len(above) > 1 and "increment" in map(str.lower, names := self._split(above[1])):
+            return above[1], names, cells  # an oscilloscope's: start and increment below the names
         if len(above) > 1 and _are_units(cells):
             names = self._split(above[1])
             if not any(map(_says, names)) and (better := self._named_above(above[:HEADER_LINES])):

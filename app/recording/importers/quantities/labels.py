@@ -214,6 +214,10 @@ def names_of(quantity: str) -> str:
     return ", ".join(target_name(quantity, unit) for unit in _units(quantity))
 
 
+#: Units that a name may end with as the letter of a channel.
+_LETTERS = frozenset("ACFKNVms")
+
+
 def label_of(name: str, unit: str = "") -> Label:
     """Return what the column ``name`` says; ``unit`` is what the file says of it elsewhere."""
     words, found = name, unit_of(unit) if unit else None
@@ -228,6 +232,8 @@ def label_of(name: str, unit: str = "") -> Label:
         if match and "[" not in match["name"] and (known := unit_of(match["unit"])):
             if match["unit"] == "1" and _read(match["name"]).quantities[:1] != ["strain"]:
                 continue  # a number
+            if found and match["unit"] in _LETTERS and not _read(match["name"]).quantities:
+                break  # Channel A, in V
             words, found = match["name"], known
             break
     symbol, dimensions = found or ("", ())
