@@ -5,11 +5,14 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
 from ast import literal_eval
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
@@ -28,23 +31,52 @@ def prepare(extras: str = "", venv: Path = VENV) -> Path:
         sys.exit(f"dearig needs Python 3.11 to 3.14; this is {sys.version.split()[0]}")
     python = venv / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     wanted = hashlib.sha256(
-        CONSTRAINTS.read_bytes()
-        + (ROOT / "pyproject.toml").read_bytes()
-        + f"{extras} {sys.version}".encode()
+        CONSTRAINTS.read_bytes() + (ROOT / "pyproject.toml").read_bytes() + sys.version.encode()
     ).hexdigest()
     stamp = venv / "installed"
-    if stamp.is_file() and stamp.read_text().strip() == wanted and python.exists():
-        return python
+    # an install that was cut short looks whole to uv and pip, which see names and versions only
+    unfinished = venv.with_name(f"{venv.name}-unfinished")
+    if python.exists() and stamp.is_file() and not unfinished.exists():
+        got, _, has = stamp.read_text().partition(" ")
+        if got == wanted and (not extras or extras == has):
+            return python
+        extras = extras or has  # the environment of the tests serves the demo too
     if importlib.util.find_spec("ensurepip") is None:
         _install_venv_package()
-    if not python.exists():
+    settings = venv / "pyvenv.cfg"
+    # python3 may be another version than when the environment was made; its packages are not seen
+    mine = re.compile(rf"^version(_info)? *= *{sys.version_info[0]}\.{sys.version_info[1]}\.", re.M)
+    is_of_this = settings.is_file() and mine.search(settings.read_text()) is not None
+    if unfinished.exists() or not python.exists() or not is_of_this:
+        unfinished.touch()
         print(f"Making the environment {venv.name} ...", flush=True)
         # by a new interpreter: one that was here before ensurepip was installed may not see it
-        subprocess.run([sys.executable, "-m", "venv", "--clear", str(venv)], check=True)
+        _must([sys.executable, "-m", "venv", "--clear", str(venv)])
+    unfinished.touch()
+    stamp.unlink(missing_ok=True)
     print(f"Installing dearig and its requirements into {venv.name} ...", flush=True)
     _install(python, "--editable", str(ROOT) + (f"[{extras}]" if extras else ""))
-    stamp.write_text(wanted)
+    stamp.write_text(f"{wanted} {extras}")
+    unfinished.unlink()
     return python
+
+
+def _must(command: list[str], **options: Any) -> None:
+    """Run a command; end this program, without a traceback, where it fails or is interrupted."""
+    try:
+        code = subprocess.run(command, check=False, **options).returncode
+    except KeyboardInterrupt:
+        sys.exit(130)
+    if code:
+        sys.exit(f"{command[0]} {' '.join(command[1:4])} ... failed (exit code {code}); see above")
+
+
+#: Where packages come from and how they are fetched: what of a person's settings of uv counts here.
+#: Others change what is installed (no-deps, target, no-editable), and uv still succeeds.
+_UV_KEPT = re.compile(
+    r"UV_(CACHE_DIR|NO_CACHE|LINK_MODE|OFFLINE|(DEFAULT|EXTRA)_INDEX.*|INDEX.*|FIND_LINKS|NO_INDEX"
+    r"|INSECURE_HOST|NATIVE_TLS|SYSTEM_CERTS|HTTP_.*|KEYRING_PROVIDER|CONCURRENT_.*)"
+)
 
 
 def _install(python: Path, *what: str) -> None:
@@ -53,24 +85,30 @@ def _install(python: Path, *what: str) -> None:
     tested = ["--quiet", "--constraint", str(CONSTRAINTS)]
     # most modules are never imported; Python compiles the others when they are
     by_pip = [*pip, "install", "--no-compile", *tested]
-    got = subprocess.run(
-        [*by_pip, "--only-binary", ":all:", "uv"], capture_output=True, check=False
-    )
-    if got.returncode == 0:
-        by_uv = [str(python), "-m", "uv", "pip", "install", "--python", str(python), *tested]
-        done = subprocess.run([*by_uv, *what], env={**os.environ, **_index(pip)}, check=False)
-        if done.returncode == 0:
-            return
-        print("uv could not; pip installs it, which takes longer ...", flush=True)
-    subprocess.run([*by_pip, *what], check=True)
+    try:
+        uv = [*by_pip, "--only-binary", ":all:", "uv"]
+        if subprocess.run(uv, capture_output=True, check=False).returncode == 0:
+            by_uv = [str(python), "-m", "uv", "--no-config", "pip", "install", *tested]
+            others = {
+                k: v for k, v in os.environ.items() if k[:3] != "UV_" or _UV_KEPT.fullmatch(k)
+            }
+            done = subprocess.run(
+                [*by_uv, "--python", str(python), *what], env={**_index(pip), **others}, check=False
+            )
+            if done.returncode == 0:
+                return
+            print("uv could not; pip installs it, which takes longer ...", flush=True)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    _must([*by_pip, *what])
 
 
 def _index(pip: list[str]) -> dict[str, str]:
     """Return the setting of the package index that pip has, for uv, which reads none of pip's."""
     listed = subprocess.run([*pip, "config", "list"], capture_output=True, text=True, check=False)
-    for line in listed.stdout.splitlines():
-        name, _, address = line.partition("=")
-        if name.endswith(".index-url"):  # the first is the one in force
+    said = dict(line.partition("=")[::2] for line in listed.stdout.splitlines())
+    for section in (":env:", "install", "global"):  # in the order in which pip obeys them
+        if address := said.get(f"{section}.index-url"):
             return {"UV_DEFAULT_INDEX": literal_eval(address)}
     return {}
 
@@ -131,6 +169,8 @@ def wait(*commands: subprocess.Popen[bytes]) -> int:
         return next(filter(None, [command.wait() for command in commands]), 0)
     except KeyboardInterrupt:
         for command in commands:
+            with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
+                command.wait(timeout=20)  # it was interrupted too, and ends what it has begun
             command.kill()
             command.wait()
         return 130
