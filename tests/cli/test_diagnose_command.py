@@ -97,7 +97,7 @@ def instead(monkeypatch: pytest.MonkeyPatch, *found: Diagnosis) -> list[int]:
         return replace(found[len(seen) - 1], interrupted=found[len(seen) - 1].interrupted or stop())
 
     monkeypatch.setattr(app_diagnose, "diagnose", search)
-    monkeypatch.setattr("dearig.model.diagnosis.events.own_of", lambda *_, **__: None)
+    monkeypatch.setattr("dearig.analysis.readings.events.own_of", lambda *_, **__: None)
     return seen
 
 

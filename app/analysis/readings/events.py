@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import Comparison, Evaluation
+from dearig.model.diagnosis.events import OneTimeEvent, Own, drifts_at_rest, own_of
 from dearig.model.effects import EFFECTS
 from dearig.model.readings.records import ActuatorRecord
 from dearig.model.simulation.actuator import Actuator
 
 if TYPE_CHECKING:
     from dearig.analysis.readings.record import Readings
-    from dearig.model.diagnosis.events import OneTimeEvent, Own
     from dearig.model.diagnosis.results import Diagnosis, Stage
 
 __all__ = ["of_each_run", "own_of_each", "recurring_events", "with_events", "without_own"]
@@ -42,9 +42,6 @@ def of_each_run(events: Mapping[str, Sequence[OneTimeEvent]]) -> tuple[OneTimeEv
 
 def own_of_each(readings: Sequence[Readings], model: Any, may_drift: bool) -> dict[str, Own | None]:
     """Return the events and the drift of each of ``readings``; None without any, and of films."""
-    # with all that fits: what only names events does without
-    from dearig.model.diagnosis.events import drifts_at_rest, own_of
-
     records = {each.name: each.record for each in readings}
     rigs = [r for r in records.values() if isinstance(r, ActuatorRecord)]
     # of all recordings together: what is slow in each, and begins with its voltage, is a law

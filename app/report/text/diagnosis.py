@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dearig.analysis.outcomes import pooled_noise, pooled_rms, pooled_steady_rms
-from dearig.analysis.readings.events import of_each_run
 from dearig.model.verdict import NOT_CONFIRMED, NOTHING_MISSING, TOLERANCE
 from dearig.report.text.excitation import tested_texts, undetermined_texts
 from dearig.report.text.laws import place_text
@@ -433,6 +432,9 @@ def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
 
 def _events_of_each_run(outcome: DiagnoseOutcome) -> Iterator[str]:
     """Yield a sentence on each event that all of several recordings have at the same moment."""
+    # a diagnosis has loaded the model; what only reads reports does without
+    from dearig.analysis.readings.events import of_each_run
+
     comparisons = (*outcome.after.train, *outcome.after.validation)
     others = of_each_run({c.name: c.events for c in comparisons})
     for event in (*outcome.recurring, *others):
