@@ -238,7 +238,7 @@ def test_bad_rows_are_refused_and_left_out_when_asked_for(opened, qtbot, tmp_pat
     assert not dialog.start.isEnabled()
     dialog.fields.skip.click()
     settled(dialog, qtbot)
-    assert "1 rows were left out" in dialog.said.text()
+    assert "1 row was left out" in dialog.said.text()
     matches(imported(dialog, qtbot))
 
 
