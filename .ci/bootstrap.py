@@ -93,7 +93,9 @@ def _install(python: Path, *what: str) -> None:
                 k: v for k, v in os.environ.items() if k[:3] != "UV_" or _UV_KEPT.fullmatch(k)
             }
             done = subprocess.run(
-                [*by_uv, "--python", str(python), *what], env={**_index(pip), **others}, check=False
+                [*by_uv, "--python", str(python), *what],
+                env={**_as_pip(pip), **others},
+                check=False,
             )
             if done.returncode == 0:
                 return
@@ -103,14 +105,18 @@ def _install(python: Path, *what: str) -> None:
     _must([*by_pip, *what])
 
 
-def _index(pip: list[str]) -> dict[str, str]:
-    """Return the setting of the package index that pip has, for uv, which reads none of pip's."""
+def _as_pip(pip: list[str]) -> dict[str, str]:
+    """Return pip's settings of index, certificates and proxy for uv, which reads none of pip's."""
     listed = subprocess.run([*pip, "config", "list"], capture_output=True, text=True, check=False)
     said = dict(line.partition("=")[::2] for line in listed.stdout.splitlines())
-    for section in (":env:", "install", "global"):  # in the order in which pip obeys them
-        if address := said.get(f"{section}.index-url"):
-            return {"UV_DEFAULT_INDEX": literal_eval(address)}
-    return {}
+    found = {}
+    for name, variable in (
+        ("index-url", "UV_DEFAULT_INDEX"), ("cert", "SSL_CERT_FILE"), ("proxy", "ALL_PROXY"),
+    ):  # fmt: skip
+        for section in (":env:", "install", "global"):  # in the order in which pip obeys them
+            if value := said.get(f"{section}.{name}"):
+                found.setdefault(variable, str(literal_eval(value)))
+    return found
 
 
 # the plugin for a real screen needs more libraries than Qt itself
