@@ -12,7 +12,6 @@ import sys
 from ast import literal_eval
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
@@ -34,7 +33,7 @@ def prepare(extras: str = "", venv: Path = VENV) -> Path:
         CONSTRAINTS.read_bytes() + (ROOT / "pyproject.toml").read_bytes() + sys.version.encode()
     ).hexdigest()
     stamp = venv / "installed"
-    # an install that was cut short looks whole to uv and pip, which see names and versions only
+    # uv and pip compare names and versions only: they keep packages of which files are missing
     unfinished = venv.with_name(f"{venv.name}-unfinished")
     if python.exists() and stamp.is_file() and not unfinished.exists():
         got, _, has = stamp.read_text().partition(" ")
@@ -47,12 +46,12 @@ def prepare(extras: str = "", venv: Path = VENV) -> Path:
     # python3 may be another version than when the environment was made; its packages are not seen
     mine = re.compile(rf"^version(_info)? *= *{sys.version_info[0]}\.{sys.version_info[1]}\.", re.M)
     is_of_this = settings.is_file() and mine.search(settings.read_text()) is not None
-    if unfinished.exists() or not python.exists() or not is_of_this:
-        unfinished.touch()
+    keeps = python.exists() and is_of_this and not unfinished.exists()
+    unfinished.touch()
+    if not keeps:
         print(f"Making the environment {venv.name} ...", flush=True)
         # by a new interpreter: one that was here before ensurepip was installed may not see it
         _must([sys.executable, "-m", "venv", "--clear", str(venv)])
-    unfinished.touch()
     stamp.unlink(missing_ok=True)
     print(f"Installing dearig and its requirements into {venv.name} ...", flush=True)
     _install(python, "--editable", str(ROOT) + (f"[{extras}]" if extras else ""))
@@ -61,10 +60,10 @@ def prepare(extras: str = "", venv: Path = VENV) -> Path:
     return python
 
 
-def _must(command: list[str], **options: Any) -> None:
+def _must(command: list[str]) -> None:
     """Run a command; end this program, without a traceback, where it fails or is interrupted."""
     try:
-        code = subprocess.run(command, check=False, **options).returncode
+        code = subprocess.run(command, check=False).returncode
     except KeyboardInterrupt:
         sys.exit(130)
     if code:
@@ -89,12 +88,10 @@ def _install(python: Path, *what: str) -> None:
         uv = [*by_pip, "--only-binary", ":all:", "uv"]
         if subprocess.run(uv, capture_output=True, check=False).returncode == 0:
             by_uv = [str(python), "-m", "uv", "--no-config", "pip", "install", *tested]
-            others = {
-                k: v for k, v in os.environ.items() if k[:3] != "UV_" or _UV_KEPT.fullmatch(k)
-            }
+            kept = {k: v for k, v in os.environ.items() if k[:3] != "UV_" or _UV_KEPT.fullmatch(k)}
             done = subprocess.run(
                 [*by_uv, "--python", str(python), *what],
-                env={**_as_pip(pip), **others},
+                env={**_as_pip(pip), **kept},
                 check=False,
             )
             if done.returncode == 0:

@@ -11,17 +11,17 @@ def prepare_all(venv: Path) -> tuple[Path, int]:
     """Install what the tests need and compile the kernels; return the Python and an exit code."""
     python = prepare("test", venv)
     compiling = start_compiling(python)
-    others = []
+    collecting = []
     try:
         prepare_screen(python)
         if compiling:
             # a process that only collects leaves compiled modules to those that run
             collect = [str(python), "-m", "pytest", "--collect-only", "-qq"]
-            others.append(start(collect, quiet=True))
+            collecting.append(start(collect, quiet=True))
         code = wait(*compiling)
-        wait(*others)  # what it could not collect, the tests report
+        wait(*collecting)  # what it could not collect, the tests report
     except BaseException:
-        for command in [*compiling, *others]:
+        for command in [*compiling, *collecting]:
             command.kill()
         raise
     return python, code
