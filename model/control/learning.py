@@ -382,17 +382,17 @@ class Learner:
         )
         expected = self._ratio * moved
         shown, predicted = self._around(np.abs(more + moved - expected)), self._around(expected)
-        clear = np.flatnonzero(predicted > self._settings.detected * noise)
-        if clear.size == 0:
+        detected = np.flatnonzero(predicted > self._settings.detected * noise)
+        if detected.size == 0:
             return np.full(shown.size, np.inf), np.zeros(shown.size, dtype=bool)
-        ratio = np.sqrt(np.maximum(shown - noise, 0.0)[clear] / predicted[clear])
+        ratio = np.sqrt(np.maximum(shown - noise, 0.0)[detected] / predicted[detected])
         lines = np.arange(shown.size)
-        off, last = np.interp(lines, clear, ratio), self._stated_up_to
+        off, last = np.interp(lines, detected, ratio), self._stated_up_to
         # what the ratio corrects for at the last line of the path grows beyond it
         corrected = abs(self._ratio[last] / abs(self._ratio[0]) - 1.0)
         grown = max(off[last], corrected) * (lines / last) ** 2
         seen = np.zeros(shown.size, dtype=bool)
-        seen[clear] = True
+        seen[detected] = True
         return np.where(lines > last, np.maximum(off, grown), off), seen
 
     def _film_over_model(self, lacking: np.ndarray) -> tuple[np.ndarray, int]:
@@ -416,16 +416,16 @@ class Learner:
 
         power = around(np.abs(moved) ** 2)
         noise = self._noise**2 * np.count_nonzero(self._inside) * (high - low)
-        detected = np.flatnonzero(power > settings.clear * noise)
-        if detected.size == 0:
+        clear = np.flatnonzero(power > settings.clear * noise)
+        if clear.size == 0:
             return np.ones(moved.size, dtype=complex), 1
-        ratio = (around((moved + more) * np.conj(moved)) / np.maximum(power, noise))[detected]
+        ratio = (around((moved + more) * np.conj(moved)) / np.maximum(power, noise))[clear]
         size = np.clip(np.abs(ratio[0]), 1.0 / settings.ratio_max, settings.ratio_max)
         most = np.radians(settings.phase_max_deg)
         ratio[0] = size * np.exp(1j * np.clip(np.angle(ratio[0]), -most, most))
-        whole = np.interp(lines, detected, ratio.real) + 1j * np.interp(lines, detected, ratio.imag)
+        whole = np.interp(lines, clear, ratio.real) + 1j * np.interp(lines, clear, ratio.imag)
         whole[0] = abs(whole[0])
-        return whole, max(int(detected[-1]), 1)
+        return whole, max(int(clear[-1]), 1)
 
     def _beyond_noise(self, change: np.ndarray) -> np.ndarray:
         """Return the part (M,) of the power of ``change`` (N,) m that is not noise (Wiener)."""

@@ -63,7 +63,7 @@ _SCALE = 0.2  # of the gain of a voltage monitor: no amplifier loses as much
 _SHOWS = 25.0  # of chi-square, above that of as many numbers: five standard deviations
 _FUNCTIONS = 7  # of the voltage, that stand for any effect: five powers and two differences
 _KEPT = 256  # predictions that are kept
-_ALIKE = 1e-12  # of the square of a column, below which all that it has of its own is rounding
+_ALIKE = 1e-12  # relative square: a column that differs less from another is parallel to it
 
 _HOOKS = ("supply", "polarise", "permittivity", "charge", "conduct", "drop")
 

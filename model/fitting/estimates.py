@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
@@ -170,11 +171,9 @@ def estimates_with_intervals(
     on = best if finer is None else replace(best, problem=finer[0])
     tick = _ticks(report, ended, layout.size, shares)
     if has_spare(layout, estimates):
-        try:
+        with suppress(_Ended):  # the notes say so
             valleys = valleys_of(on, estimates, partial(_end_if, ended))
             estimates, sums = widened(valleys, estimates, tick, _Ended)
-        except _Ended:
-            pass  # the notes say so
         if ended():
             estimates = [_without_valleys(e) for e in estimates]
     if not ended():
@@ -217,8 +216,7 @@ def _ticks(
     def tick() -> None:
         # how many points a profile takes is not known: four are the rule
         report((before + 1.0 - 0.5 ** (next(points) / 2.0)) / shares)
-        if ended():
-            raise _Ended
+        _end_if(ended)
 
     return tick
 
@@ -232,7 +230,11 @@ def _without_valleys(e: Estimate) -> Estimate:
     """Return ``e`` with the note that other valleys were not followed to their ends."""
     if not e.free or not e.determined:
         return e
-    return replace(e, note=f"{e.note}; {ONE_VALLEY}" if e.note else ONE_VALLEY)
+    return replace(e, note=_with(e.note, ONE_VALLEY))
+
+
+def _with(note: str, more: str) -> str:
+    return f"{note}; {more}" if note else more
 
 
 def _estimate(
@@ -252,9 +254,9 @@ def _estimate(
     elif at_end:
         note = end_text(q, value)
     elif not followed:
-        note = f"{note}; {BY_CURVATURE}" if note else BY_CURVATURE
+        note = _with(note, BY_CURVATURE)
     if not at_end and (why := _cut(q, low, high)):
-        note = f"{note}; {why}" if note else why
+        note = _with(note, why)
     return Estimate(
         q.name, q.unit, value, low, high, determined, note, at_bound=at_end, constraint=q.constraint
     )

@@ -25,7 +25,7 @@ _SAME_MOMENT = 0.02  # s: times of events are stated to a hundredth
 def of_each_run(events: Mapping[str, Sequence[OneTimeEvent]]) -> tuple[OneTimeEvent, ...]:
     """Return the events, by recording, that all of several have at the same moment of their run.
 
-    Such an event comes with each run and did not happen once. The first one stands for all.
+    Such an event comes with each run. Of those alike, the one with the earliest time is returned.
     """
     every = ((e.kind, e.time, name, e) for name, some in events.items() for e in some)
     found = sorted(every, key=lambda one: one[:3])

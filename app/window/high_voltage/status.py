@@ -11,10 +11,11 @@ import json
 import logging
 import math
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QLockFile, QObject, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QLockFile, QObject, QSettings, Qt, QTimer, Signal, Slot
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.clock import TOLERANCE, ClockWatch
@@ -328,14 +329,13 @@ class HighVoltageStatus(QObject):
                 "what is on the output is unknown: switch the amplifier off, and read the log",
                 time.time(),
                 self._session.address,
-            )
+            ),
+            QSettings.sync,  # there is no voltage yet, so that it may take its time
         )
-        self._session.settings.sync()  # there is no voltage yet, so that it may take its time
 
     def run_ended(self, alarm: LatchedAlarm | None) -> None:
         """Latch ``alarm``; None for a run that ended as it should."""
         self._keep(alarm)
-        write_apart(self._session.settings)  # the program may die in the next moment
         if self._lock is not None:
             self._lock.unlock()
             self._lock = None
@@ -409,7 +409,11 @@ class HighVoltageStatus(QObject):
 
     # the settings
 
-    def _keep(self, alarm: LatchedAlarm | None) -> None:
+    def _keep(
+        self,
+        alarm: LatchedAlarm | None,
+        write: Callable[[QSettings], object] = write_apart,
+    ) -> None:
         address = self._session.address if self.alarm is None else self.alarm.address
         if is_simulated(address):
             return
@@ -418,6 +422,7 @@ class HighVoltageStatus(QObject):
             self._session.settings.remove(key)
         else:
             self._session.settings.setValue(key, json.dumps(asdict(alarm)))
+        write(self._session.settings)  # the program may die in the next moment
 
     def _restore(self) -> None:
         """Latch what an earlier start of the program has left: for this rig, else for another."""
