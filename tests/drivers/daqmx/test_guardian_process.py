@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import nidaqmx
 import psutil
@@ -161,9 +162,18 @@ def test_take_over_reports_what_was_done(bench):
 
 def test_the_outcome_of_a_take_over_that_took_too_long_is_told_later(bench, monkeypatch):
     monkeypatch.setattr("dearig.drivers.daqmx.guardian._TAKES_OVER_WITHIN", 0.0)
+    monkeypatch.setattr("dearig.drivers.daqmx.guardian._ANSWERS_WITHIN", ANSWERS_WITHIN)
+    write, answers = bench.card.device.outputs.write, threading.Event()
+
+    def write_late(*arguments):
+        answers.wait(ANSWERS_WITHIN)
+        return write(*arguments)
+
+    monkeypatch.setattr(bench.card.device.outputs, "write", write_late)
     with pytest.raises(RigError, match="goes on trying"):
         bench.guardian.take_over()
     assert bench.guardian.tries
+    answers.set()
     report = bench.guardian.outcome(REPORTS_WITHIN)
     assert report is not None
     assert report.confirmed
