@@ -123,7 +123,7 @@ def _film(readings: Readings, model: Actuator | Strip) -> _Predicted:
         warnings.append(f"the film was held {recording.kinematics}, the model's {model.kinematics}")
     answer = replace(model, kinematics=recording.kinematics).simulate(recording.time, stretch)
     if not answer.ok:
-        raise InputError(f"{recording.path}: the model cannot follow it: {answer.status_text}")
+        raise _cannot_follow(readings, answer.status_text)
     try:
         readings.known_noise()
     except ModelError as error:
@@ -144,7 +144,7 @@ def _actuator(readings: Readings, model: Actuator | Strip) -> _Predicted:
     drive, valid = readings.voltage, readings.quality.valid
     response = model.simulate(drive, readings.lag)
     if not response.ok:
-        raise InputError(f"{recording.path}: the model cannot follow it: {response.status_text}")
+        raise _cannot_follow(readings, response.status_text)
     means = mean_about(response.displacement, recording.average)
     predicted = counted(means, readings.lead_in)
     usable = np.ones(predicted.size, dtype=bool) if valid is None else valid
@@ -153,6 +153,15 @@ def _actuator(readings: Readings, model: Actuator | Strip) -> _Predicted:
     )
     warnings = (*_other_rig(recording, model), *_unknown_air(model, drive), *said)
     return _Predicted(predicted, drive.voltage, spiky, warnings)
+
+
+def _cannot_follow(readings: Readings, why: str) -> InputError:
+    """Return the error of a model that fails under the drive, with what is odd about the readings.
+
+    A model that was fitted to readings with a fault may fail for that fault.
+    """
+    odd = "".join(f"{text}; " for text in readings.quality.findings)
+    return InputError(f"{readings.recording.path}: {odd}the model cannot follow it: {why}")
 
 
 def _converter_step(recording: Recording) -> float:

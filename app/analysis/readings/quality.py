@@ -14,6 +14,7 @@ from dearig.analysis.readings.faults import clipped, gaps, outliers, stuck, wher
 from dearig.analysis.readings.plausible import check_units
 from dearig.errors import InputError
 from dearig.model.readings.spikes import spikes
+from dearig.recording.content.sign import sign_text
 from dearig.recording.reading.recording import Recording
 
 __all__ = ["Quality", "check_driven", "driven_by", "inspect"]
@@ -44,7 +45,8 @@ def inspect(recording: Recording, moved: np.ndarray | None) -> Quality:
     if moved is None or signal.size < _SAMPLES_MIN:
         return Quality(None, ())  # the fit refuses these with a better sentence
     check_units(recording, moved)
-    findings = list(gaps(recording, moved))
+    reversed_ = sign_text(recording.kind, moved, signal)
+    findings = [*([reversed_] if reversed_ else []), *gaps(recording, moved)]
     # the film is pulled by the square of the voltage
     pull = moved if recording.kind == "film" else moved**2
     bad = np.zeros(signal.size, dtype=bool)

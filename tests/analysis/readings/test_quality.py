@@ -14,7 +14,13 @@ from dearig.analysis.readings.compatibility import check_apart
 from dearig.analysis.readings.enough import check_enough, extrapolated, overlap
 from dearig.analysis.readings.record import Readings
 from dearig.errors import InputError
-from dearig.model.film.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.film.material import (
+    TABLE_3,
+    THESIS_FILM,
+    THESIS_LOAD,
+    Network,
+    Spring,
+)
 from dearig.model.simulation.actuator import Actuator, Drive
 from dearig.recording import open_recording
 from dearig.recording.content.metadata import RunMetadata
@@ -101,6 +107,30 @@ class TestGood:
         still = np.random.default_rng(3).normal(0.0, NOISE, on.size)
         values["displacement"] = 0.4e-3 * on + 0.1e-3 * (values["time"] >= 4.0) + still
         assert Readings(keep(values)).quality.valid is None
+
+
+class TestSign:
+    """As of a laser that is mounted the other way round, or of compression written as positive."""
+
+    @pytest.mark.parametrize(
+        ("values", "signal", "what"),
+        [
+            (lobes(), "displacement", "displacement falls where the voltage rises"),
+            (cycles(), "nominal_stress", "stress falls where the stretch rises"),
+        ],
+    )
+    def test_a_signal_with_the_other_sign_is_asked_about(self, keep, values, signal, what):
+        values[signal] = -values[signal]
+        look = Readings(keep(values)).quality
+        assert look.valid is None
+        assert [f"{what}: is its sign right?" in finding for finding in look.findings] == [True]
+
+    def test_a_model_that_fails_under_the_drive_is_not_the_only_thing_reported(self, keep):
+        values = lobes()
+        values["displacement"] = -values["displacement"]
+        soft = Actuator(THESIS_FILM, THESIS_LOAD, Network(Spring(50.0)))
+        with pytest.raises(InputError, match=r"is its sign right\?.*cannot follow it: no rest"):
+            compare(Readings(keep(values)), soft, "train")
 
 
 class TestMasks:

@@ -15,14 +15,9 @@ from dearig.recording.content.bounds import (
     TEMPERATURE,
     VOLTAGE,
 )
+from dearig.recording.content.sign import sign_text
 
 __all__ = ["plausibility_warnings"]
-
-#: Correlation of displacement and squared voltage beyond which the sign is sure. It is 0.7 to 1 for
-#: films with creep, friction or drift under sines, lobes and chirps, and near 0 for noise alone.
-SIGN_SURE = 0.5
-#: Samples from which that correlation is computed, at most.
-THINNED = 2**17
 
 
 def _span(values: np.ndarray) -> float:
@@ -32,23 +27,6 @@ def _span(values: np.ndarray) -> float:
 def _largest(values: np.ndarray) -> float:
     """Return the largest absolute value of ``values`` (n,)."""
     return max(float(values.max()), -float(values.min()))
-
-
-def _shared_sign(voltage: np.ndarray, displacement: np.ndarray) -> float:
-    """Return the correlation of displacement with the square of the voltage, from -1 to 1.
-
-    The Maxwell stress goes with the square, so the sign of the voltage does not matter. 0 where
-    one of the two does not change.
-    """
-    # a part of the samples tells as much
-    thinned = slice(None, None, max(-(-voltage.size // THINNED), 1))
-    voltage, displacement = voltage[thinned], displacement[thinned]
-    # relative to the largest: no square overflows
-    drive = (voltage / max(_largest(voltage), 1e-300)) ** 2
-    pull = drive - drive.mean()
-    moved = displacement - displacement.mean()
-    size = float(np.linalg.norm(pull) * np.linalg.norm(moved))
-    return float(pull @ moved) / size if size > 0.0 else 0.0
 
 
 def plausibility_warnings(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
@@ -75,14 +53,13 @@ def plausibility_warnings(values: Mapping[str, np.ndarray], film: Film | None) -
             span < DISPLACEMENT_SPAN.low,
             f"displacement spans {span * 1e6:.4g} um only; is its unit right?",
         )
-    if {"displacement", "voltage_command"} <= values.keys():
-        share = _shared_sign(values["voltage_command"], values["displacement"])
-        check(
-            "displacement",
-            share < -SIGN_SURE,
-            "displacement falls where the voltage rises: is its sign right? A film gets longer "
-            "under voltage, so its displacement grows",
-        )
+    for kind, drive, signal in (
+        ("actuator", "voltage_command", "displacement"),
+        ("film", "stretch", "nominal_stress"),
+    ):
+        if {drive, signal} <= values.keys():
+            sentence = sign_text(kind, values[drive], values[signal])
+            check(signal, bool(sentence), sentence)
     if "voltage_command" in values:
         highest = _largest(values["voltage_command"])
         check(
