@@ -11,14 +11,16 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QPointF, QTimer, Signal, Slot
-from PySide6.QtGui import QGuiApplication, QImage
+from PySide6.QtGui import QGuiApplication, QImage, QShowEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.recording.files import system_text
 from dearig.window.documents.dialogs import save_as
+from dearig.window.kit.turns import Turns
 from dearig.window.plots import export as plot_export
 from dearig.window.plots.canvas import GAP, Canvas, Drag
 from dearig.window.plots.cursors import CursorGroup
@@ -81,6 +83,7 @@ class PlotArea(QWidget):
         self._history: list[_Past] = []
         self._following = live
         self._range_chosen = False  # the operator has chosen a range
+        self._turns = Turns(lambda: session.busy, self)
         self._stale = QTimer(self, singleShot=True, interval=_READOUT)
         self._stale.timeout.connect(self._renew_readouts)
         self.tools = PlotTools(self)
@@ -128,6 +131,15 @@ class PlotArea(QWidget):
             plot.restyle(theme)
         for group in self._groups.values():
             group.restyle(theme)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Show; while the rig is busy, one plot after another."""
+        super().showEvent(event)
+        # the first picture of several plots takes longer than STOP may wait
+        self._turns.clear()
+        for plot in self.plots:
+            plot.setOpacity(0.0)
+        self._turns.add([partial(plot.setOpacity, 1.0) for plot in self.plots])
 
     # plots
 
@@ -465,12 +477,12 @@ class PlotArea(QWidget):
 
     def image(self) -> QImage:
         """Return a picture of the plots, in twice the resolution of the screen."""
-        with self._without_hair():
+        with self._as_picture():
             return plot_export.image(self.canvas, self._session.theme.surface)
 
     def svg(self) -> bytes:
         """Return the plots as SVG."""
-        with self._without_hair():
+        with self._as_picture():
             return plot_export.svg(self.canvas, self._session.theme.surface)
 
     def csv_text(self, visible: bool = False, group: str = "", delimiter: str = ",") -> str:
@@ -481,7 +493,7 @@ class PlotArea(QWidget):
     @Slot()
     def copy_picture(self) -> None:
         """Copy the plots to the clipboard, as a picture and as SVG."""
-        with self._without_hair():
+        with self._as_picture():
             data = plot_export.clipboard_data(self.canvas, self._session.theme.surface)
         QGuiApplication.clipboard().setMimeData(data)
         self._session.message.emit("The plots are on the clipboard")
@@ -527,7 +539,9 @@ class PlotArea(QWidget):
         return save_as(self, self._session, title, start, kinds, ending)
 
     @contextmanager
-    def _without_hair(self) -> Iterator[None]:
+    def _as_picture(self) -> Iterator[None]:
+        """Show all plots, and no crosshair."""
+        self._turns.finish()
         for group in self._groups.values():
             group.hide_hair_for_picture(hidden=True)
         try:

@@ -7,7 +7,9 @@ from PySide6.QtWidgets import QAbstractScrollArea
 from pytestqt.qtbot import QtBot
 
 from dearig.window.kit.turns import Turns
+from dearig.window.plots.area import PlotArea
 from dearig.window.recordings.page import RecordingsPage
+from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from tests.window.conftest import press
 
@@ -50,3 +52,25 @@ def test_all_of_a_page_that_is_opened_while_armed_is_drawn_in_the_end(
     shown = window.stack.findChildren(QAbstractScrollArea)
     assert not any(part.updatesEnabled() for part in shown)
     qtbot.waitUntil(lambda: all(part.updatesEnabled() for part in (window.stack, *shown)))
+
+
+def test_plots_that_are_shown_while_armed_appear_one_by_one_and_all_are_in_a_picture(
+    qtbot: QtBot, session: Session
+) -> None:
+    area = PlotArea(session, "test")
+    plots = [area.add_plot(row, left="Voltage (kV)") for row in range(3)]
+    qtbot.addWidget(area)
+    area.show()
+    assert [plot.opacity() for plot in plots] == [1.0] * 3
+    area.hide()
+    session.armed = True
+    area.show()
+    assert [plot.opacity() for plot in plots] == [0.0] * 3
+    qtbot.waitUntil(lambda: plots[0].opacity() == 1.0)
+    area.hide()  # before all are drawn
+    area.show()
+    area.image()
+    assert [plot.opacity() for plot in plots] == [1.0] * 3
+    area.hide()
+    area.show()
+    qtbot.waitUntil(lambda: [plot.opacity() for plot in plots] == [1.0] * 3)
