@@ -327,7 +327,7 @@ def curves(
     """
     recording = open_recording(path)
     progress(recording.name, 0.5)
-    time, measured = recording.time, recording.signal
+    time, measured = recording.time, recording.measured
     drawn: tuple[np.ndarray, np.ndarray] | None = None
     residual: tuple[np.ndarray, np.ndarray] | None = None
     errors, unfit = None, ""
@@ -395,7 +395,7 @@ def spectra(
         residual = amplitude_density(compared.measured - compared.model, recording.rate)
     except DearigError:
         residual = None  # the curves say why
-    measured = amplitude_density(recording.displacement, recording.rate)
+    measured = amplitude_density(recording.signal, recording.rate)
     return Spectra(recording.name, measured, residual)
 
 

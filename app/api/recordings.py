@@ -93,7 +93,7 @@ class Recording(stored.Recording, HasPage):
             self.kind,
             self.time,
             self.voltage_command if self.kind == "actuator" else self.stretch,
-            self.signal,
+            self.measured,
             self.displacement_model,
         )
 

@@ -71,7 +71,7 @@ def _extremes(
     if not starts.size:
         return
     parts = np.concatenate(([0], starts[1:]))
-    found = [(np.minimum.reduceat(row, parts), np.maximum.reduceat(row, parts)) for row in values]
+    found = [(np.fmin.reduceat(row, parts), np.fmax.reduceat(row, parts)) for row in values]
     for i, start in enumerate(starts):
         row = [str(i + 1), f"{time[start]:.6g}"]
         for low, high in found:

@@ -77,7 +77,7 @@ def console_for(json: str | None = None) -> Console:
 #: What is added to a text about these options, in place of their names in brackets.
 _SUFFIXES = {
     "force": ", or use --force",
-    "skip_bad_rows": "; --skip-bad-rows leaves such rows out",
+    "skip_bad_rows": "; --skip-bad-rows leaves such rows or readings out",
 }
 
 

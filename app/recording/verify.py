@@ -17,7 +17,13 @@ from dearig.input_file import why_no_file
 from dearig.recording.content.checksums import wrong_blocks
 from dearig.recording.content.flushes import flush_notes
 from dearig.recording.content.journal import whole_journal
-from dearig.recording.content.layout import EVENT_LEVELS, SIGNALS, TIMING, counts_name
+from dearig.recording.content.layout import (
+    EVENT_LEVELS,
+    SIGNALS,
+    TIMING,
+    counts_name,
+    missing_in,
+)
 from dearig.recording.content.physical import KELVIN, SLICE, Counts
 from dearig.recording.content.provenance import CONTINUES
 from dearig.recording.content.pyramid import BINS
@@ -153,7 +159,8 @@ class _Check:
         """Check that every stored value can be read: HDF5 checks each chunk's checksum."""
         arrays = self.recording.arrays
         for name in arrays.stored:
-            before = -np.inf
+            before, gaps = -np.inf, 0
+            missing = missing_in(self.data[name])
             for start, stop in self.slices():
                 try:
                     values = self.data[name][start:stop]
@@ -168,12 +175,26 @@ class _Check:
                         self.fault(f"time does not increase in {self.span(start, stop)}")
                         break
                     before = values[-1]
-                elif name != "displacement_model" and not np.isfinite(values).all():
+                    continue
+                if missing:
+                    gaps += int(np.count_nonzero(np.isnan(values)))
+                    values = values[~np.isnan(values)]
+                if name != "displacement_model" and not np.isfinite(values).all():
                     self.fault(
                         f"/entry/data/{name} has values that are not finite in "
                         f"{self.span(start, stop)}"
                     )
                     break
+            else:
+                if gaps != missing:
+                    self.fault(
+                        f"/entry/data/{name} says that {missing} readings are missing, and {gaps} "
+                        f"are"
+                    )
+                elif gaps:
+                    self.found.notes.append(
+                        f"{gaps} of {self.samples} readings of /entry/data/{name} are missing"
+                    )
         if arrays.stored:
             self.done(f"{len(arrays.stored)} arrays of stored values, {self.samples} samples each")
 

@@ -172,7 +172,8 @@ def _converter_step(recording: Recording) -> float:
     for channel in recording.channels:
         if channel.name == SIGNALS[recording.kind]:
             return resolution(channel, recording.average)
-    levels = np.unique(recording.signal[:_STEP_SAMPLES])
+    measured = recording.measured[:_STEP_SAMPLES]
+    levels = np.unique(measured[np.isfinite(measured)])
     rises = np.diff(levels)
     if rises.size < MIN_QUIET:
         return 0.0

@@ -10,8 +10,9 @@ from dearig.errors import InputError
 from dearig.model.readings.records import interpolated
 from dearig.model.readings.spikes import RINGING, spikes
 from dearig.recording.reading.recording import Recording
+from dearig.units import counted
 
-__all__ = ["clipped", "gaps", "outliers", "place", "spikes_about", "stuck", "where"]
+__all__ = ["clipped", "gap_text", "gaps", "outliers", "place", "spikes_about", "stuck", "where"]
 
 _LONG = 25  # readings of one value: more than noise of a fraction of a step leaves
 #: Steps by which a parabola may fall over half of its flat top beyond either end: 3 where the top
@@ -162,6 +163,18 @@ def where(recording: Recording, what: str, runs: Sequence[tuple[int, int]]) -> s
     return (
         f"{what} at {value * scale:.4g} {unit} from {place(recording, runs[0][0])} on"
         f"{places}; {samples} sample{'s' if samples > 1 else ''} taken out"
+    )
+
+
+def gap_text(recording: Recording, missing: np.ndarray) -> str:
+    """Return a sentence on the readings that ``missing`` (N,) says an imported file has not."""
+    count = int(np.count_nonzero(missing))
+    places = int(np.count_nonzero(np.diff(missing.astype(np.int8), prepend=0) > 0))
+    return (
+        f"{counted(count, 'reading')} {'is' if count == 1 else 'are'} missing, from "
+        f"{place(recording, int(np.argmax(missing)))} on"
+        f"{'' if places == 1 else f', in {places} places'}; no fit uses "
+        f"{'it' if count == 1 else 'them'}"
     )
 
 

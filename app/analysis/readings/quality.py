@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.analysis.readings.faults import clipped, gaps, outliers, stuck, where
+from dearig.analysis.readings.faults import clipped, gap_text, gaps, outliers, stuck, where
 from dearig.analysis.readings.plausible import check_units
 from dearig.errors import InputError
 from dearig.model.readings.spikes import spikes
@@ -41,15 +41,19 @@ def inspect(recording: Recording, moved: np.ndarray | None) -> Quality:
     Raises ``InputError`` for faults that no mask removes: a unit that is wrong by a thousand, a gap
     in which the film was driven, too few samples left.
     """
-    signal = recording.signal
+    signal, missing = recording.signal, recording.missing
     if moved is None or signal.size < _SAMPLES_MIN:
-        return Quality(None, ())  # the fit refuses these with a better sentence
+        # the fit refuses these with a better sentence
+        return Quality(None if missing is None else ~missing, ())
     check_units(recording, moved)
     reversed_ = sign_text(recording.kind, moved, signal)
     findings = [*([reversed_] if reversed_ else []), *gaps(recording, moved)]
     # the film is pulled by the square of the voltage
     pull = moved if recording.kind == "film" else moved**2
     bad = np.zeros(signal.size, dtype=bool)
+    if missing is not None:
+        findings.append(gap_text(recording, missing))
+        bad |= missing
     for what, runs in (
         ("the sensor is clipped", clipped(signal, pull)),
         ("the sensor is stuck", stuck(recording.time, signal, pull)),
@@ -85,11 +89,18 @@ def driven_by(recording: Recording, drive: str) -> np.ndarray | None:
         return recording.stretch
     if drive != "monitor":
         return recording.voltage_command
-    if recording.voltage_monitor is None:
+    monitor = recording.voltage_monitor
+    if monitor is None:
         raise InputError(
             f"{recording.path} has no voltage monitor; use the commanded voltage", option="drive"
         )
-    return recording.voltage_monitor
+    if gaps := int(np.count_nonzero(np.isnan(monitor))):
+        raise InputError(
+            f"{recording.path}: {gaps} of {monitor.size} readings of the voltage monitor are "
+            f"missing, and what drove the film there is not known; use the commanded voltage",
+            option="drive",
+        )
+    return monitor
 
 
 def check_driven(recording: Recording, moved: np.ndarray | None) -> None:

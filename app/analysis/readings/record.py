@@ -79,7 +79,8 @@ class Readings:
         most probable one.
         """
         recording = self.recording
-        displacement, noise = _present(recording.displacement), recording.noise
+        _present(recording.displacement)
+        displacement, noise = recording.signal, recording.noise
         if noise is None or not noise.step or not self.lead_in:
             return displacement
         at_rest = displacement[: recording.quiet_samples]
@@ -172,7 +173,7 @@ class Readings:
     def _record(self) -> Record:
         recording = self.recording
         if recording.kind == "film":
-            stretch, stress = _present(recording.stretch), _present(recording.nominal_stress)
+            stretch, stress = _present(recording.stretch), recording.signal
             _known(recording, recording.noise)  # refuses one that never changes
             self.check_driven()
             valid, noise = self.quality.valid, self.known_noise()
@@ -250,7 +251,7 @@ def noise_texts(readings: Iterable[Readings]) -> list[str]:
             continue
         if noise.source == LEAD_IN:
             at_rest = slice(0, recording.quiet_samples)
-            rest = _present(recording.displacement)[at_rest]
+            rest = recording.signal[at_rest]
             slow = slow_at_rest(recording.time[at_rest], rest, noise.value)
             if slow:
                 fast = math.sqrt(noise.value**2 - slow**2)

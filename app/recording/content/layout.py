@@ -12,6 +12,8 @@
                         scaling contains the division
                         also of the channels that the rig file declares, by their names; while a
                         run is going on its signal is displacement_counts, and there are no axes
+                        readings that an imported file did not have are NaN, counted by the
+                        attribute missing of their row; time and the drive have none
 /entry/instrument/*     one NXinstrument for each instrument, with its settings as an attribute;
                         channels/NAME links to the counts
 /entry/sample           NXsample: film and load
@@ -48,6 +50,7 @@ from dearig.recording.content.text import fixed, put_text, text_of
 
 __all__ = [
     "AVERAGE_COLUMN",
+    "DRIVING",
     "ENVIRONMENT_TYPE",
     "EVENT_LEVELS",
     "EVENT_TYPE",
@@ -58,6 +61,7 @@ __all__ = [
     "LIBVER",
     "LINEAR",
     "MESSAGE_BYTES",
+    "MISSING",
     "REQUIRED",
     "SIGNALS",
     "TIMING",
@@ -73,6 +77,7 @@ __all__ = [
     "iso_time",
     "lay_out",
     "make_own_scale",
+    "missing_in",
     "name_dimensions",
     "show_plot",
     "variable_attributes",
@@ -92,6 +97,9 @@ KINDS = ("actuator", "film")
 
 #: Measured quantity of each kind: the default plot, and the target of a model.
 SIGNALS = MappingProxyType({"actuator": "displacement", "film": "nominal_stress"})
+
+#: Values without which a sample tells nothing: none of them is ever missing.
+DRIVING = frozenset({"time", "voltage_command", "stretch"})
 
 #: Values that a recording of each kind must have.
 REQUIRED = MappingProxyType(
@@ -147,6 +155,9 @@ IDENTIFIER = "entry_identifier_uuid"
 
 #: Attributes of a row: skew, delay and the error of the delay, in s.
 TIMING = ("skew_s", "delay_s", "delay_error_s")
+
+#: Attribute of a row: how many of its readings are missing, which are NaN; absent where none is.
+MISSING = "missing"
 
 #: Column of an exported table without metadata: conversions whose mean each row is, if several.
 AVERAGE_COLUMN = "conversions_per_row"
@@ -216,6 +227,13 @@ def declared_channels(data: h5py.Group) -> dict[str, tuple[str, str]]:
             found[name] = place, text_of(unit), text_of(attrs.get("label", ""))
     ordered = sorted(found.items(), key=lambda one: (one[1][0], one[0]))
     return {name: (unit, label) for name, (_, unit, label) in ordered}
+
+
+def missing_in(row: h5py.Dataset) -> int:
+    """Return how many readings of ``row`` are missing, as the file says; the drive has them all."""
+    count = row.attrs.get(MISSING, 0)
+    name = row.name.rpartition("/")[2]
+    return int(count) if isinstance(count, int | np.integer) and name not in DRIVING else 0
 
 
 def variable_attributes(name: str, unit: str = "", label: str = "") -> dict[str, str]:

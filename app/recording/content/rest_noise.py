@@ -147,7 +147,11 @@ def noise_floor(time: np.ndarray, values: np.ndarray) -> float | None:
 
 
 def mean_beyond_noise(values: np.ndarray) -> float:
-    """Return the mean of the lead-in ``values`` (n,), or 0 if noise alone could explain it."""
+    """Return the mean of the lead-in ``values`` (n,), or 0 if noise alone could explain it.
+
+    Readings that are missing, which are NaN, take no part.
+    """
+    values = values[np.isfinite(values)]
     n = values.size
     if n < MIN_QUIET:
         return 0.0

@@ -26,16 +26,18 @@ _TEXTS = {
 
 
 def sign_text(kind: str, drive: np.ndarray, signal: np.ndarray) -> str:
-    """Return a sentence where ``signal`` (N,) falls while ``drive`` (N,) rises, else "".
+    """Return a sentence where ``signal`` (N,), as far as it is known, falls while ``drive`` (N,) rises, else "".
 
     ``kind`` is that of the recording. An actuator's drive is its voltage: the Maxwell stress goes
     with its square, so the sign of the voltage does not matter. A film's drive is its stretch.
     """
-    if drive.size == 0:
-        return ""
     # a part of the samples tells as much
     thinned = slice(None, None, max(-(-drive.size // _THINNED), 1))
     drive, signal = drive[thinned], signal[thinned]
+    known = np.isfinite(signal)
+    drive, signal = drive[known], signal[known]
+    if drive.size == 0:
+        return ""
     # relative to the largest: no square overflows
     relative = drive / max(float(drive.max()), -float(drive.min()), 1e-300)
     pull = relative if kind == "film" else relative**2

@@ -86,9 +86,11 @@ def description_of(recording: Recording) -> dict[str, str]:
     """Return the metadata that an import reads back, as texts by name.
 
     ``channels`` has the columns that no quantity of an import is in: name, unit and label of a
-    declared channel, and the name alone of what a model computed.
+    declared channel, and the name alone of what a model computed. ``missing`` has the number of
+    missing readings of each column that has such.
     """
     columns = _columns(recording)
+    gaps = {column: recording.gaps(name) for name, column in columns.items()}
     return {
         "format": FORMAT,
         "name": recording.name,
@@ -116,5 +118,6 @@ def description_of(recording: Recording) -> dict[str, str]:
                 if name not in IMPORTED
             }
         ),
+        "missing": json.dumps({column: count for column, count in gaps.items() if count}),
         "events": json.dumps([[e.sample, e.level, e.message] for e in recording.events]),
     }

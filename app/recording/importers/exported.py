@@ -42,7 +42,8 @@ class Exported:
     """Fields as in a ``Recording``; missing or invalid ones have their defaults.
 
     ``channels`` are the columns of declared channels: name, unit and label; ``computed`` are the
-    columns that a model computed, which are not imported. ``timing`` are skew, delay and the error
+    columns that a model computed, which are not imported. ``missing`` are the columns with readings
+    that are missing. ``timing`` are skew, delay and the error
     of the delay of the displacement in s. ``origin`` has those values of the provenance that say
     where the data are from. ``rest_reading`` is that of a displacement that is counted from it
     already, None if the file tells none. ``started`` is the Unix time in s of the start of the run,
@@ -60,6 +61,7 @@ class Exported:
     events: tuple[Event, ...] = ()
     channels: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
     computed: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
     timing: tuple[float, float, float] = (0.0, 0.0, 0.0)
     started: float | None = None
 
@@ -83,6 +85,7 @@ def exported(about: Mapping[str, str]) -> Exported:
         events=tuple(_events(about.get("events", ""))),
         channels={column: (n, u, t) for column, (n, u, t) in columns if _is_channel(n, u)},
         computed=tuple(column for column, (n, u, _) in columns if not u and n in UNITS),
+        missing=tuple(_noted(about.get("missing", ""))),
         timing=_timing(about.get("displacement_timing", "")),
         started=_started(noted),
     )

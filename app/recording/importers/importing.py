@@ -74,7 +74,8 @@ class ImportOptions:
     names_line : int, optional
         Line of the names in a text file, from 1.
     skip_bad_rows : bool
-        Leave out rows that cannot be used; their places become events of the recording.
+        Leave out rows whose time or drive cannot be used; their places become events of the
+        recording. Other readings that cannot be used are missing, and their rows stay.
     table : str, optional
         Table of a file with several: a sheet, a specimen, a group. By default the only one with
         all the columns that are needed.
@@ -183,6 +184,7 @@ def import_file(
         rest_reading=found.rest_reading,
         events=found.events,
         channels=found.values.channels,
+        missing=found.values.missing,
         timing=found.timing,
         started=None if found.start is None else found.start.at,
         overwrite=overwrite,
@@ -225,7 +227,9 @@ def prepare(
     with ThreadPoolExecutor(1) as pool:
         digest = pool.submit(file_sha256, path, stop)
         try:
-            values = values_of(chosen, specimen, options.rate_Hz, options.skip_bad_rows)
+            values = values_of(
+                chosen, specimen, options.rate_Hz, options.skip_bad_rows, was.missing
+            )
         except BaseException:
             stop.set()  # of a wrong cell, or an interrupt, one hears at once
             raise

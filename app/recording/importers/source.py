@@ -93,7 +93,8 @@ class Source(Protocol):
     ``is_finite``, True if ``read`` returns finite numbers only; ``cut_short``, True if columns may
     end early; ``notes``, sentences on what was found; ``progress``, a callable that can be set,
     which gets the part of ``read`` that is done; ``optional``, columns that can be set, for which
-    ``read`` raises ``GapError`` where a cell is not a number; ``overview(names, count)``, the
+    ``read`` raises ``GapError`` where a cell is not a number; ``measured``, the same, for which
+    ``read`` returns NaN there and keeps the row; ``overview(names, count)``, the
     ``Overview`` of columns, in one reading; ``began(column)``, the date and time from which a
     column of time counts, or None; ``started``, that of the first row where no column has it.
     """

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.content.layout import UNITS
+from dearig.recording.content.layout import UNITS, missing_in
 from dearig.recording.content.physical import Counts, Rest
 from dearig.recording.content.pyramid import reduced
 from dearig.recording.content.rest_noise import lead_in
@@ -24,6 +24,9 @@ from dearig.recording.reading.opening import identifier_of, read_from
 __all__ = ["Arrays", "Overview"]
 
 T = TypeVar("T")
+
+#: Readings of a channel that are not missing, at least: a line across the others has two ends.
+READINGS_MIN = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +41,10 @@ class Overview:
 class Arrays:
     """Values in the recording at ``path``: ``stored`` there, or ``derived`` from its counts.
 
-    Arrays are float64 and read-only. They are checked when they are read: values are finite and
-    time increases. Every method raises ``InputError`` for values that cannot be read or fail a
-    check, and ``ReplacedError`` if another recording than that of ``identifier`` is there by now.
+    Arrays are float64 and read-only. They are checked when they are read: time increases, values
+    are finite, and readings that are missing, as the file says, are NaN. Every method raises
+    ``InputError`` for values that cannot be read or fail a check, and ``ReplacedError`` if another
+    recording than that of ``identifier`` is there by now.
     """
 
     def __init__(
@@ -79,7 +83,7 @@ class Arrays:
         for name in names:
             values = self._cut(entry, name, 0, self.samples)
             if name in self.stored:
-                self._check(name, values)
+                self._check(name, values, missing_in(self._row(entry, name)))
             values.setflags(write=False)
             self._read[name] = values
 
@@ -148,9 +152,15 @@ class Arrays:
         self._rest = counts.rest
         return counts
 
-    def _check(self, name: str, values: np.ndarray) -> None:
+    def _check(self, name: str, values: np.ndarray, missing: int) -> None:
         # the overlay model has no value where it failed
         finite = np.isfinite(values)
+        gaps = np.isnan(values) if missing else np.zeros_like(finite)
+        count = int(np.count_nonzero(gaps))
+        # the first part of a recording may have fewer gaps than all of it
+        known = count == missing or (count < missing and self.samples < self._in_file)
+        if known and finite.size - count >= READINGS_MIN:
+            finite |= gaps
         if not finite.all() and name != "displacement_model":
             at = int(np.argmin(finite))
             raise InputError(

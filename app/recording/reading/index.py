@@ -325,7 +325,9 @@ def _peaks(
             continue
         least, most = float(low[known].min()), float(high[known].max())
         peaks[name] = least if -least > most else most
-        if name == signal and known.all():
+        if name == signal:
+            places = np.arange(low.size)  # readings of an imported file may be missing
+            low, high = (np.interp(places, places[known], end[known]) for end in (low, high))
             outline = _outline(low, high, least, most)
     return peaks, outline
 
@@ -337,7 +339,7 @@ def _reduced(row: h5py.Dataset, points: int) -> tuple[np.ndarray, np.ndarray]:
         values = row[()].astype(np.float64)
         return reduced(values, values, points)
     ends = [
-        (values.min(), values.max())
+        (np.fmin.reduce(values), np.fmax.reduce(values))
         for values in (row[start : start + step] for start in range(0, row.size, step))
     ]
     low, high = np.array(ends, dtype=np.float64).T

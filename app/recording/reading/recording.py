@@ -51,6 +51,8 @@ class RecordedEvent:
 class Recording:
     """A recording as read. Arrays are (N,) float64 and read-only; None means "not recorded".
 
+    A reading that an imported file did not have is NaN; time and the drive have a value everywhere.
+
     They are read from the file on first use, so that a recording of hours opens without delay;
     ``overview`` and ``window`` read only what they return.
 
@@ -142,8 +144,11 @@ class Recording:
         """Return ``name``, a key of ``CONDITIONS``, over the time of the samples: (N,).
 
         From a channel at the card, or else from the thermo-hygrometer; None where neither gave it.
+        Where a reading is missing, it is on a line between its neighbours.
         """
         row = self._row(CONDITIONS[name].channel)
+        if row is not None and np.isnan(row).any():
+            row = _filled(self.time, row)
         if row is None and self.environment is not None:
             row = self.environment.at(name, self.time)
         return row
@@ -211,9 +216,32 @@ class Recording:
         return {name: self.arrays.read(name) for name in self.arrays.names}
 
     @property
-    def signal(self) -> np.ndarray:
-        """The measured quantity: displacement in m, or nominal stress in Pa."""
+    def measured(self) -> np.ndarray:
+        """The measured quantity: displacement in m, or nominal stress in Pa; NaN where missing."""
         return self.arrays.read(SIGNALS[self.kind])
+
+    @cached_property
+    def signal(self) -> np.ndarray:
+        """The measured quantity for computations: missing readings are on a line across them."""
+        if self.missing is None:
+            return self.measured
+        filled = _filled(self.time, self.measured)
+        filled.setflags(write=False)
+        return filled
+
+    @cached_property
+    def missing(self) -> np.ndarray | None:
+        """(N,) True where the measured quantity has no reading; None where all are there."""
+        gaps = np.isnan(self.measured)
+        gaps.setflags(write=False)
+        return gaps if gaps.any() else None
+
+    def gaps(self, name: str) -> int:
+        """Return how many readings of the channel ``name`` are missing."""
+        # a converter always gives a count, so a run need not be read for it
+        if self.channels or name in ("time", "displacement_model"):
+            return 0
+        return int(np.count_nonzero(np.isnan(self.arrays.read(name))))
 
     @property
     def samples(self) -> int:
@@ -293,9 +321,12 @@ class Recording:
         # only the lead-in is read where it is enough
         for last in (quiet, end) if quiet >= MIN_QUIET else (end,):
             time, readings = (self.arrays.window(n, 0, last) for n in ("time", name))
-            if last < end and takes_few_values(readings):
+            if last < end and takes_few_values(readings[np.isfinite(readings)]):
                 continue
             usable = None if valid is None else valid[:last]
+            there = np.isfinite(readings)
+            if not there.all():
+                usable = there if usable is None else usable & there
             found = noise_of_readings(time, readings, quiet, usable)
             if found is not None:
                 return found
@@ -349,3 +380,9 @@ class Recording:
     def sha256(self) -> str:
         """SHA-256 of the file, computed on first use."""
         return file_sha256(self.path)
+
+
+def _filled(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return ``values`` (N,) at ``time`` (N,) with lines across those that are NaN."""
+    there = ~np.isnan(values)
+    return np.where(there, values, np.interp(time, time[there], values[there]))

@@ -131,6 +131,8 @@ def _channel(recording: Recording, name: str) -> dict[str, Any]:
     if known.any():
         low, high = float(whole.low[known].min()), float(whole.high[known].max())
     row = {"name": name, "unit": recording.unit(name), "min": low, "max": high}
+    if gaps := recording.gaps(name):
+        row["missing"] = gaps
     if name in recording.declared:
         row["label"] = recording.declared[name]
     return row
@@ -185,9 +187,11 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
     for channel in d["channels"]:
         scale, unit = _READABLE.get(channel["name"], (1.0, channel["unit"]))
         if channel["min"] is not None:
-            span = f"{_span(channel['min'] * scale, channel['max'] * scale)} {unit}"
+            span = f"{_span(channel['min'] * scale, channel['max'] * scale)} {unit}".rstrip()
+            if gaps := channel.get("missing"):
+                span += f", {gaps} of {d['samples']} readings missing"
             shown = channel.get("label", channel["name"].replace("_", " "))
-            rows.append((shown, span.rstrip()))
+            rows.append((shown, span))
     if d["environment"] is not None:
         rows.append(("room", _room_row(d["environment"])))
     noise = recording.noise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -19,6 +19,7 @@ from dearig.recording.content.layout import (
     LIBVER,
     LINEAR,
     MESSAGE_BYTES,
+    MISSING,
     REQUIRED,
     TIMING,
     UNITS,
@@ -57,6 +58,7 @@ def save_recording(
     rest_reading: float = 0.0,
     events: Iterable[Event] = (),
     channels: Mapping[str, tuple[str, str]] = MappingProxyType({}),
+    missing: Collection[str] = (),
     timing: tuple[float, float, float] = (0.0, 0.0, 0.0),
     started: float | None = None,
     overwrite: bool = False,
@@ -66,7 +68,8 @@ def save_recording(
     """Write arrays as a recording.
 
     ``values`` are (N,) each, by their names in ``layout.UNITS`` and in those units, or of further
-    ``channels``, which have unit and label by name. ``timing`` are skew, delay and the delay's
+    ``channels``, which have unit and label by name. Where those in ``missing`` are NaN, there was
+    no reading. ``timing`` are skew, delay and the delay's
     error of the displacement in s. ``kind`` is actuator or film, ``hold``, ``average`` and
     ``kinematics`` are as in ``Recording``, ``rest_reading`` in m has been subtracted from the
     displacement. ``started`` is the Unix time in s of the first sample, by default ``now()``.
@@ -76,12 +79,12 @@ def save_recording(
     """
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r} is not one of {', '.join(KINDS)}")
-    missing = [name for name in REQUIRED[kind] if name not in values]
+    absent = [name for name in REQUIRED[kind] if name not in values]
     unknown = [name for name in values if name not in UNITS and name not in channels]
     if taken := [name for name in channels if name in RESERVED_NAMES or name.endswith(_COUNTS)]:
         raise ValueError(f"recordings use the names {taken} themselves")
-    if missing or unknown:
-        raise ValueError(f"a recording of kind {kind}: missing {missing}, unknown {unknown}")
+    if absent or unknown:
+        raise ValueError(f"a recording of kind {kind}: missing {absent}, unknown {unknown}")
     size = np.asarray(values["time"]).size
     shapes = {name: np.shape(array) for name, array in values.items()}
     if set(shapes.values()) != {(size,)}:
@@ -103,6 +106,8 @@ def save_recording(
             if name in channels:
                 field.attrs["declared"] = number
                 field.attrs["label"] = fixed(label)
+            if name in missing and (gaps := int(np.count_nonzero(np.isnan(numbers)))):
+                field.attrs[MISSING] = gaps
             for first in range(0, size, WRITTEN):
                 progress("writing", (number + first / size) / len(values))
                 field[first : first + WRITTEN] = numbers[first : first + WRITTEN]

@@ -170,14 +170,17 @@ def test_an_optional_column_with_gaps_costs_no_rows(tmp_path: Path) -> None:
     asked = {"temperature_C": "temperature_C"}
     with refused("line 3, column 'temperature_C': there is no value"):
         imported(tmp_path, text, columns=asked)
-    assert imported(tmp_path, text, columns=asked, skip_bad_rows=True)[1].samples == 7
+    _, run = imported(tmp_path, text, columns=asked, skip_bad_rows=True)
+    same(run)
+    assert np.isnan(run.temperature).tolist() == [i % 9 != 0 for i in range(TIME.size)]
 
 
 def test_the_first_rows_count_even_if_they_cannot_be_read(tmp_path: Path) -> None:
     lines = table("time_s,voltage_V,displacement_mm", "{t:.2f},{v:.6f},{m:.9f}").splitlines()
     for number in (1, 2):
-        lines[number] = lines[number].rpartition(",")[0] + ",OVER"
-    with refused("line 2, column 'displacement_mm': 'OVER' is not a num"):
+        time, _, moved = lines[number].split(",")
+        lines[number] = f"{time},OVER,{moved}"
+    with refused("line 2, column 'voltage_V': 'OVER' is not a num"):
         imported(tmp_path, "\n".join(lines))
     done, run = imported(tmp_path, "\n".join(lines), skip_bad_rows=True)
     assert run.samples == TIME.size - 2

@@ -99,15 +99,18 @@ def test_written_markers_stand_for_no_reading(
             imported(path)
     run = taken(path, skip_bad_rows=bool(said))
     kept = np.delete(np.arange(ROWS), [40, 41, 58])
-    np.testing.assert_allclose(run.time, TIME[kept], atol=1e-9)
-    np.testing.assert_allclose(run.voltage_command, VOLTAGE[kept], rtol=1e-8)
-    np.testing.assert_allclose(run.displacement, MOVED[kept], atol=1e-12)
+    there = np.isfinite(run.displacement)
+    assert run.samples == (ROWS if place == 2 else kept.size)
+    np.testing.assert_allclose(run.time[there], TIME[kept], atol=1e-9)
+    np.testing.assert_allclose(run.voltage_command[there], VOLTAGE[kept], rtol=1e-8)
+    np.testing.assert_allclose(run.displacement[there], MOVED[kept], atol=1e-12)
 
 
 def test_a_single_row_of_nines_is_a_marker_and_a_step_is_none(tmp_path: Path) -> None:
     moved = [f"{1e3 * m + 0.3:.9g}" for m in MOVED]
     moved[50] = "-99999"
-    assert taken(write(tmp_path, TIME, VOLTAGE, moved)).samples == ROWS - 1
+    run = taken(write(tmp_path, TIME, VOLTAGE, moved))
+    assert np.flatnonzero(run.missing).tolist() == [50]
     volts = np.where(TIME < 0.3, np.sin(9.0 * np.arange(ROWS)), 9990.0)
     assert taken(write(tmp_path, TIME, volts, 1e3 * MOVED)).samples == ROWS
 

@@ -21,12 +21,12 @@ __all__ = ["plausibility_warnings"]
 
 
 def _span(values: np.ndarray) -> float:
-    return float(values.max() - values.min())
+    return float(np.nanmax(values) - np.nanmin(values))
 
 
 def _largest(values: np.ndarray) -> float:
     """Return the largest absolute value of ``values`` (n,)."""
-    return max(float(values.max()), -float(values.min()))
+    return max(float(np.nanmax(values)), -float(np.nanmin(values)))
 
 
 def plausibility_warnings(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
@@ -82,7 +82,7 @@ def plausibility_warnings(values: Mapping[str, np.ndarray], film: Film | None) -
             f"is its unit right?",
         )
     if "temperature" in values:
-        low, high = float(values["temperature"].min()), float(values["temperature"].max())
+        low, high = (float(end(values["temperature"])) for end in (np.nanmin, np.nanmax))
         check(
             "temperature",
             low < TEMPERATURE.low or high > TEMPERATURE.high,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -12,7 +12,7 @@ import numpy as np
 from dearig.errors import InputError, Note
 from dearig.recording.importers.columns.chosen import Chosen, Pick, label_in
 from dearig.recording.importers.columns.guess import LENGTHS, PULLS
-from dearig.recording.importers.columns.markers import markers_in
+from dearig.recording.importers.columns.missing import without_readings, without_rows
 from dearig.recording.importers.columns.specimen import Specimen, specimen_from_header
 from dearig.recording.importers.columns.start import MeasurementStart, start_of
 from dearig.recording.importers.columns.time_faults import (
@@ -43,10 +43,6 @@ OPTIONAL = MappingProxyType(
         "temperature": "temperature",
     }
 )
-#: Quantities that an instrument measures, which writes a marker where it has no reading, and those
-#: that a step may bring far off all other values.
-_MARKED = frozenset({"displacement", "force", "nominal_stress", "strain", "stretch", "current"})
-_STEPPED = frozenset({"time", "voltage", "voltage_monitor", "temperature"})
 #: Time in s above which a first time stamp counts from a fixed day, not from the start of a run.
 LONG_AGO = 1e7
 
@@ -58,7 +54,8 @@ class Values:
     ``left`` are the places of rows that were left out, by the sample before which they stood.
     ``warnings`` are what should be checked and ``notes`` what was done to the values. ``start`` is
     the start of the measurement, where the file tells it. ``channels`` has unit and label of
-    declared channels.
+    declared channels. ``missing`` are the names of columns with readings that the file does not
+    have, which are NaN.
     """
 
     kind: str
@@ -69,15 +66,25 @@ class Values:
     start: MeasurementStart | None = None
     channels: dict[str, tuple[str, str]] = field(default_factory=dict)
 
+    @property
+    def missing(self) -> tuple[str, ...]:
+        return tuple(name for name, column in self.columns.items() if np.isnan(column).any())
+
 
 def values_of(
-    chosen: Chosen, specimen: Specimen, rate_Hz: float | None, skip_bad_rows: bool
+    chosen: Chosen,
+    specimen: Specimen,
+    rate_Hz: float | None,
+    skip_bad_rows: bool,
+    gaps: Collection[str] = (),
 ) -> Values:
     """Return the values of the columns in ``chosen``, in the units of a recording.
 
-    ``rate_Hz`` makes the time of a file that has none. Raises ``InputError`` for what no recording
-    can be.
+    ``rate_Hz`` makes the time of a file that has none. With ``skip_bad_rows`` rows whose time or
+    drive cannot be used are left out, and other readings that cannot are missing; they may be so
+    in the columns ``gaps`` in any case. Raises ``InputError`` for what no recording can be.
     """
+    take = _Take(rate_Hz, skip_bad_rows, frozenset(gaps))
     values = Values(_kind(chosen), {}, notes=list(chosen.notes))
     values.channels = {name: (unit, label) for name, unit, label in chosen.channels.values()}
     if values.kind == "actuator":
@@ -87,8 +94,8 @@ def values_of(
             values.warnings.append("gauge length and area are for film data, and were not used")
         if "displacement" not in chosen.picked:
             raise _no_column(chosen, "displacement")
-        wanted = ["time", "voltage", "displacement", *OPTIONAL, *chosen.channels]
-        found = _read(chosen, values, wanted, rate_Hz, skip_bad_rows)
+        measured = ["displacement", *OPTIONAL, *chosen.channels]
+        found = _read(chosen, values, ["time", "voltage"], measured, take)
         values.columns = {
             "time": found["time"],
             "displacement": found["displacement"],
@@ -97,8 +104,9 @@ def values_of(
         values.columns |= {OPTIONAL[q]: found[q] for q in OPTIONAL if q in found}
         values.columns |= {name: found[key] for key, (name, *_) in chosen.channels.items()}
         return values
-    measured = ["time", "temperature", *_film_columns(chosen, specimen, values)]
-    found = _read(chosen, values, [*measured, *chosen.channels], rate_Hz, skip_bad_rows)
+    length, pull = _film_columns(chosen, specimen, values)
+    measured = [pull, "temperature", *chosen.channels]
+    found = _read(chosen, values, ["time", length], measured, take)
     channels = {name: found.pop(key) for key, (name, *_) in chosen.channels.items()}
     if "strain" in found:
         found["stretch"] = 1.0 + found.pop("strain")
@@ -237,20 +245,33 @@ def _no_column(
     )
 
 
+@dataclass(frozen=True)
+class _Take:
+    """How values are taken, as in ``values_of``."""
+
+    rate_Hz: float | None
+    skips: bool
+    gaps: frozenset[str]
+
+    def may_miss(self, quantity: str, column: str, chosen: Chosen) -> bool:
+        """Return whether readings of ``quantity`` in ``column`` may be missing."""
+        return column in self.gaps or (self.skips and quantity not in chosen.optional)
+
+
 def _read(
-    chosen: Chosen,
-    values: Values,
-    quantities: list[str],
-    rate_Hz: float | None,
-    skip: bool,
+    chosen: Chosen, values: Values, driving: list[str], measured: list[str], take: _Take
 ) -> dict[str, np.ndarray]:
-    """Return the checked values of ``quantities`` that exist, in the recording's units."""
+    """Return the checked values of the quantities that exist, in the recording's units.
+
+    Those ``driving`` are needed in every row, of those ``measured`` a reading may be missing.
+    """
     source = chosen.source
     path = source.path
-    picked = {q: chosen.picked[q] for q in quantities if q in chosen.picked}
+    picked = {q: chosen.picked[q] for q in (*driving, *measured) if q in chosen.picked}
     columns = [pick.column for pick in picked.values()]
-    step = _step(chosen, columns, rate_Hz)
-    raw = _read_columns(chosen, picked, values)
+    step = _step(chosen, columns, take.rate_Hz)
+    free = {q for q in measured if q in picked and take.may_miss(q, picked[q].column, chosen)}
+    raw = _read_columns(chosen, picked, free, values)
     values.notes += getattr(source, "notes", ())
     values.warnings += getattr(source, "warnings", ())
     columns = [pick.column for pick in picked.values()]
@@ -269,25 +290,24 @@ def _read(
         if not step * size < float("inf"):
             raise InputError(f"{path}: {step!r} s from row to row is too long")
         table["time"] = step * np.arange(size)
-        said = getattr(source, "step_from", "") if rate_Hz is None else ""
+        said = getattr(source, "step_from", "") if take.rate_Hz is None else ""
         values.notes.append(
             f"time is counted from the first row, {step:.9g} s from row to row"
             f"{said and f', as {said} says'}"
         )
-    _leave_gaps(chosen, picked, table, values)
+    _leave_gaps(chosen, picked, table, free, values)
     names = (
         {q: pick.column for q, pick in picked.items()}
         | {"time": "time"}
         | {q: pick.column for q, pick in picked.items() if q == "time"}
     )
-    good = _unmarked(chosen, table, picked, values)
+    good, missing = without_rows(chosen, table, picked, measured, values.warnings)
     if "time" in picked and _is_clock(source, picked["time"].column):
         table["time"], notes, warnings = one_clock(table["time"], source.row)
         values.notes += notes
         values.warnings += warnings
-    good = _good_rows(chosen, table, names, skip, good)
-    if not good.all():
-        table = {q: column[good] for q, column in table.items()}
+    good = _good_rows(chosen, table, names, take.skips, good, missing, free)
+    table = without_readings(chosen, table, picked, good, missing, free, values.warnings)
     if "time" in picked:
         _check_epoch(chosen, picked["time"], table["time"])
         table["time"] = _counted_by_sixties(chosen, picked["time"], table["time"], values)
@@ -371,14 +391,18 @@ def _counted_by_sixties(chosen: Chosen, pick: Pick, time: np.ndarray, values: Va
     )
 
 
-def _read_columns(chosen: Chosen, picked: dict[str, Pick], values: Values) -> dict[str, np.ndarray]:
-    """Return the columns ``picked``, without optional ones that have gaps.
+def _read_columns(
+    chosen: Chosen, picked: dict[str, Pick], free: Collection[str], values: Values
+) -> dict[str, np.ndarray]:
+    """Return the columns ``picked``, without optional ones that have gaps and are not ``free``.
 
     Changes ``picked`` and the notes.
     """
     source = chosen.source
+    if hasattr(source, "measured"):
+        source.measured = frozenset(picked[q].column for q in free)
     while True:
-        optional = {picked[q].column: q for q in chosen.optional if q in picked}
+        optional = {picked[q].column: q for q in chosen.optional - set(free) if q in picked}
         if hasattr(source, "optional"):
             source.optional = frozenset(optional)
         try:
@@ -388,17 +412,21 @@ def _read_columns(chosen: Chosen, picked: dict[str, Pick], values: Values) -> di
 
 
 def _leave_gaps(
-    chosen: Chosen, picked: dict[str, Pick], table: dict[str, np.ndarray], values: Values
+    chosen: Chosen,
+    picked: dict[str, Pick],
+    table: dict[str, np.ndarray],
+    free: Collection[str],
+    values: Values,
 ) -> None:
     """Leave out optional columns that have no number where all others have one.
 
-    Changes ``picked``, ``table`` and the notes.
+    Those that are ``free`` may have gaps. Changes ``picked``, ``table`` and the notes.
     """
-    optional = [q for q in chosen.optional if q in table]
+    optional = [q for q in chosen.optional if q in table and q not in free]
     if not optional:
         return
     good = np.ones(table["time"].size, dtype=bool)
-    for quantity in table.keys() - set(optional):
+    for quantity in table.keys() - {*optional, *free}:
         good &= np.isfinite(table[quantity])
     for quantity in optional:
         gaps = good & ~np.isfinite(table[quantity])
@@ -451,44 +479,30 @@ def _place(source: Source, good: np.ndarray) -> Callable[[int], str]:
     return lambda at: source.row(int(np.flatnonzero(good)[at]))
 
 
-def _unmarked(
-    chosen: Chosen, table: dict[str, np.ndarray], picked: Mapping[str, Pick], values: Values
-) -> np.ndarray:
-    """Return which rows have no marker for a missing reading, (n,) bool. Changes the warnings."""
-    good = np.ones(table["time"].size, dtype=bool)
-    for quantity in (_MARKED | _STEPPED) & table.keys():
-        marked, found = markers_in(table[quantity], codes_only=quantity in _STEPPED)
-        if found:
-            good &= ~marked
-            shown = " and ".join(f"{value:.9g}" for value in found)
-            first = chosen.source.row(int(np.argmax(marked)))
-            values.warnings.append(
-                f"{int(marked.sum())} readings of {picked[quantity].column!r} are {shown}, far off "
-                f"all others, first in {first}: that stands for "
-                f"no reading, and the rows are left out"
-            )
-    return good
-
-
 def _good_rows(
     chosen: Chosen, table: dict[str, np.ndarray], names: dict[str, str], skip: bool,
-    good: np.ndarray,
+    good: np.ndarray, missing: Mapping[str, np.ndarray], free: Collection[str],
 ) -> np.ndarray:  # fmt: skip
     """Return which of the ``good`` rows are finite and go forward in time, (n,) bool.
 
-    Raises ``InputError`` for the first other one unless ``skip``.
+    Readings that are ``missing``, or ``free`` to be, count as there. Raises ``InputError`` for the
+    first other row unless ``skip``.
     """
     source, marked = chosen.source, ~good
     good = good.copy()
     finite = {}
     if not getattr(source, "is_finite", False):
-        finite = {q: np.isfinite(column) | marked for q, column in table.items()}
+        finite = {
+            q: np.isfinite(column) | marked | missing.get(q, np.False_)
+            for q, column in table.items()
+            if q not in free
+        }
     for column in finite.values():
         good &= column
     bad = ~good & ~marked
     if not skip and bad.any():
         at = int(np.argmax(bad))
-        quantity = next(q for q in table if not finite[q][at])
+        quantity = next(q for q in finite if not finite[q][at])
         cell = getattr(source, "cell", None)
         wrong = "" if cell is None else cell(at, names[quantity])
         raise skip_or_refuse(

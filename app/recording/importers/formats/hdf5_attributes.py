@@ -20,6 +20,7 @@ from dearig.recording.importers.source import PARSER_FAILURES
 
 __all__ = [
     "ATTRIBUTE_MAX",
+    "gap_text",
     "numbers_in",
     "own_scale",
     "pickled_texts",
@@ -108,6 +109,8 @@ def own_scale(data: h5py.Dataset) -> str:
     return f"{found[0]} = {', '.join(f'{one:g}' for one in found[1][:4])}" if found else ""
 
 
+#: Attributes with values that stand for no reading.
+_GAPS = ("_FillValue", "missing_value")
 #: Attributes by which CF scales, if they are numbers.
 _OF_CF = ("scale_factor", "add_offset")
 
@@ -137,12 +140,12 @@ _UNIT_OF = ("_units", "_unit")
 def unpacked(data: h5py.Dataset) -> Callable[[np.ndarray], np.ndarray] | None:
     """Return what makes numbers of the stored values of ``data``, as CF says; None if nothing.
 
-    ``scale_factor`` and ``add_offset`` scale; ``_FillValue`` and ``missing_value`` are gaps;
+    ``scale_factor`` and ``add_offset`` scale; values in ``_GAPS`` are gaps;
     ``_Unsigned`` says that stored integers have no sign.
     """
     scale = next(iter(numbers_in(data, "scale_factor")), 1.0)
     offset = next(iter(numbers_in(data, "add_offset")), 0.0)
-    gaps = [*numbers_in(data, "_FillValue"), *numbers_in(data, "missing_value")]
+    gaps = [value for name in _GAPS for value in numbers_in(data, name)]
     without_sign = data.dtype.kind == "i" and texts_in(data, "_Unsigned")[:1] == ["true"]
     if scale == 1.0 and offset == 0.0 and not gaps and not without_sign:
         return None
@@ -152,8 +155,20 @@ def unpacked(data: h5py.Dataset) -> Callable[[np.ndarray], np.ndarray] | None:
             values = values.view(values.dtype.str.replace("i", "u"))
         found = values.astype(np.float64) * scale + offset
         for gap in gaps:
-            with np.errstate(all="ignore"):
-                found[values == np.asarray(gap).astype(values.dtype)] = np.nan
+            found[_equal(values, gap)] = np.nan
         return found
 
     return unpack
+
+
+def gap_text(data: h5py.Dataset, value: np.ndarray) -> str:
+    """Return which attribute of ``data`` says that the stored ``value`` () is none, or ""."""
+    for name in _GAPS:
+        if any(_equal(value, gap) for gap in numbers_in(data, name)):
+            return f"{value:.6g} is the {name} that the file declares, no reading"
+    return ""
+
+
+def _equal(values: np.ndarray, gap: float) -> np.ndarray:
+    with np.errstate(all="ignore"):
+        return np.asarray(values == np.asarray(gap).astype(values.dtype))

@@ -15,7 +15,12 @@ from dearig.input_file import open_input
 from dearig.recording.content.layout import FORMAT
 from dearig.recording.content.safe import Refused, check_heaps, checked, item
 from dearig.recording.files import one_line, system_text
-from dearig.recording.importers.formats.hdf5_attributes import own_scale, stated_step, unpacked
+from dearig.recording.importers.formats.hdf5_attributes import (
+    gap_text,
+    own_scale,
+    stated_step,
+    unpacked,
+)
 from dearig.recording.importers.formats.hdf5_attributes import texts_in as _texts
 from dearig.recording.importers.formats.mat_file import OBJECTS
 from dearig.recording.importers.formats.pandas_hdf5 import (
@@ -185,6 +190,7 @@ class _Walk:
                 StoredColumn(
                     self._loader(data.name, _flat, unpack, kind), int(data.size), own,
                     "s" if kind else unit, "time" if kind else label, group, step, scaled=scaled,
+                    cell=self._cell(data.name, _flat),
                 ),
             )  # fmt: skip
             return
@@ -209,10 +215,11 @@ class _Walk:
                 label = unit = ""
             elif stated:
                 unit = stated[place]
+            pick = _row(place) if turned else _column(place)
             yield inside, StoredColumn(
-                self._loader(data.name, _row(place) if turned else _column(place), unpack, kind),
+                self._loader(data.name, pick, unpack, kind),
                 rows, own_name, "s" if kind else unit, "time" if kind else label,
-                path if names else group, step, scaled=scaled,
+                path if names else group, step, scaled=scaled, cell=self._cell(data.name, pick),
             )  # fmt: skip
 
     def _in_fields(self, data: h5py.Dataset, path: str) -> Iterator[tuple[str, StoredColumn]]:
@@ -303,6 +310,15 @@ class _Walk:
             return values if unpack is None else unpack(values)
 
         return load
+
+    def _cell(self, name: str, pick: Callable[[h5py.Dataset], np.ndarray]) -> Callable[[int], str]:
+        path = self._path
+
+        def cell(index: int) -> str:
+            with h5py.File(path, "r", locking=False) as file:
+                return gap_text(file[name], pick(file[name])[index])
+
+        return cell
 
 
 def _flat(data: h5py.Dataset) -> np.ndarray:

@@ -83,8 +83,6 @@ class TextFile(NamedColumns[TextColumn]):
     With ``skip_bad_rows`` rows that cannot be read are left out; ``skipped`` then has their lines.
     """
 
-    is_finite = True  # other cells are refused, or their rows left out
-
     def __init__(
         self, path: Path, names_line: int | None = None, skip_bad_rows: bool = False
     ) -> None:
@@ -126,6 +124,8 @@ class TextFile(NamedColumns[TextColumn]):
         super().__init__(columns)
         #: columns that are given up, with ``GapError``, where a cell is not a number
         self.optional: frozenset[str] = frozenset()
+        #: columns that are NaN where a cell is not a number
+        self.measured: frozenset[str] = frozenset()
         self._skip = skip_bad_rows
         # it costs a third of the parsing
         self._is_spaced = f"{self.layout.delimiter} " in head
@@ -140,6 +140,11 @@ class TextFile(NamedColumns[TextColumn]):
         #: rows before each row that was left out, and its line, in words
         self.skipped: list[tuple[int, str]] = []
         self._spans: list[_Span] = []
+
+    @property
+    def is_finite(self) -> bool:
+        """True where other cells are refused, or their rows left out."""
+        return not self.measured
 
     @property
     def labels(self) -> dict[str, str]:
@@ -207,7 +212,7 @@ class TextFile(NamedColumns[TextColumn]):
             except _WrongCellError as error:
                 wrong = error.with_traceback(None)  # which would keep the rows that were read
             if wrong is not None:
-                if wrong.grouped and self._decide(wrong.column):
+                if wrong.is_open and (self._decide(wrong.column) or self._skip):
                     continue
                 if wrong.column in self.optional:
                     raise GapError(wrong.place, wrong.column) from wrong
@@ -490,14 +495,24 @@ usecols=sorted(places), dtype=str, na_filter=False,
                     f"those above: the rows behind them may be of another order and other units; "
                     f"make two files of it"
                 )
-            elif self._leaves_out and column not in self.optional:
+            elif self._leaves_out and column not in self.optional and not self._is_open(column):
                 self.skipped.append((before + len(rows), f"line {number}"))
                 lost = len(self.skipped)
                 if self._counts and lost > _LOST_MAX and lost > before + len(rows):
                     raise _HopelessError
             else:
-                raise _WrongCellError(f"line {number}{fault}", column, self._grouped)
+                is_open = self._is_open(column)
+                raise _WrongCellError(f"line {number}{fault}", column, is_open)
         return list(np.array(rows, dtype=np.float64).reshape(len(rows), len(self._wanted)).T)
+
+    def _is_open(self, name: str) -> bool:
+        """Return True for a wrong cell that the signs of its column, not decided yet, may right."""
+        column = self._columns.get(name)
+        return (
+            self._grouped
+            and column is not None
+            and not (name in self._decided or column.since is not None)
+        )
 
     def _holds_data(self, content: str) -> bool:
         """Return True if a line has a row of the columns that are read.
@@ -531,6 +546,9 @@ usecols=sorted(places), dtype=str, na_filter=False,
             if value is None or not math.isfinite(value):
                 wrong = complaint_about(cell, value)
                 self._grouped = GROUPED.fullmatch(cell) is not None
+                if column.name in self.measured and not self._is_open(column.name):
+                    values.append(math.nan)
+                    continue
                 return f", column {column.name!r}: {wrong}", [], column.name
             values.append(value)
         return "", values, ""
@@ -543,13 +561,13 @@ class _HopelessError(Exception):
 class _WrongCellError(Exception):
     """A cell is not a number, or a line is not a row, at a ``place`` in words.
 
-    ``column`` is its name, "" where the whole line is wrong; ``grouped`` if digits of the cell
-    stand in groups.
+    ``column`` is its name, "" where the whole line is wrong; ``is_open`` if digits of the cell
+    stand in groups, of which the file has not decided yet.
     """
 
-    def __init__(self, place: str, column: str, grouped: bool) -> None:
+    def __init__(self, place: str, column: str, is_open: bool) -> None:
         super().__init__(place)
-        self.place, self.column, self.grouped = place, column, grouped
+        self.place, self.column, self.is_open = place, column, is_open
 
 
 @dataclass(frozen=True)
