@@ -86,8 +86,8 @@ def import_(
         bool,
         typer.Option(
             "--skip-bad-rows",
-            help="Leave out rows whose time or drive cannot be read, or goes back; keep rows that only "
-            "lack another reading.",
+            help="Leave out rows whose time or drive cannot be read, or goes back; keep rows that "
+            "only lack another reading.",
         ),
     ] = False,
     gauge_length_mm: Annotated[

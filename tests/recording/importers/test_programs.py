@@ -387,3 +387,46 @@ def test_a_tdms_file_that_was_continued_is_said(tmp_path: Path, again: float) ->
     assert any("was continued" in d and "60 s after its start" in d for d in done.warnings) == (
         again > 0
     )
+
+
+@pytest.mark.parametrize("word", ["Labels", "Label", "Channel Label:"])
+def test_the_labels_of_an_oscilloscope_name_its_channels(tmp_path: Path, word: str) -> None:
+    path = tmp_path / "in.csv"
+    head = f"Model,MSO24\n\nVertical Scale,1,1\n{word},HV (V),Laser (mm)\nTIME (s),CH1,CH2\n"
+    path.write_text(head + "\n".join(",".join(f"{v:.12g}" for v in row) for row in TABLE), "utf-8")
+    same(taken(path))
+    # what the line leaves empty keeps its name
+    path.write_text(path.read_text("utf-8").replace(",HV (V),", ",,"), "utf-8")
+    same(taken(path, columns={"voltage_V": "CH1"}))
+
+
+def test_a_first_column_of_labels_is_a_column(tmp_path: Path) -> None:
+    path = tmp_path / "in.csv"
+    rows = "\n".join(f"{i},{v:.12g},{d:.12g}" for i, (_, v, d) in enumerate(TABLE.tolist()))
+    path.write_text(f"Label,HV (V),Laser (mm)\n{rows}\n", "utf-8")
+    same(taken(path, rate_Hz=100.0))
+
+
+@pytest.mark.parametrize("dated", [False, True])
+def test_the_index_of_a_table_that_pandas_splits_may_be_the_time(
+    tmp_path: Path, dated: bool
+) -> None:
+    path = tmp_path / "in.json"
+    start = datetime(2024, 4, 12, 23, 59, 58)
+    index = [(start + timedelta(seconds=t)).isoformat() if dated else t for t in TIME.tolist()]
+    content = {"columns": NAMES[1:], "index": index, "data": TABLE[:, 1:].tolist()}
+    path.write_text(json.dumps(content), "utf-8")
+    if not dated:
+        with refused("'index' may be the time.*--column time_UNIT=index"):
+            imported(path)
+    same(taken(path, columns={} if dated else {"time_s": "index"}))
+
+
+def test_an_index_without_a_name_may_be_the_time_in_a_table_of_pandas(tmp_path: Path) -> None:
+    path = tmp_path / "in.json"
+    rows = [dict(zip(("index", *NAMES[1:]), row, strict=True)) for row in TABLE.tolist()]
+    fields = [{"name": name, "type": "number"} for name in rows[0]]
+    path.write_text(json.dumps({"schema": {"fields": fields}, "data": rows}), "utf-8")
+    with refused("'data.index' may be the time.*--column time_UNIT=data.index"):
+        imported(path)
+    same(taken(path, columns={"time_s": "data.index"}))

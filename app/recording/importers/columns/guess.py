@@ -172,7 +172,7 @@ class Guess:
         step = getattr(source, "step_s", None)
         free = [
             n for n in self._free
-            if self._labels[n] == Label(n, unexplained=self._labels[n].unexplained)
+            if replace(self._labels[n], name="", unexplained="") == Label("")
         ]  # fmt: skip
         if not free or len(free) > COMPARED_MAX or len(free) == len(self._labels):
             return

@@ -113,6 +113,10 @@ def _in_object(
     if isinstance(names, list) and isinstance(rows, list) and _is_text(names) and _is_rows(rows):
         units = value.get("units")
         stated = units if isinstance(units, list) and _is_text(units) else ()
+        index = value.get("index")  # of a table that pandas splits, which may be the time
+        if isinstance(index, list) and _is_column(index) and not _numbers_rows(index):
+            own = "index" if "index" not in names else "index #2"
+            yield f"{path}.{own}" if path else own, _stored(index, own, path)
         yield from _in_rows(rows, names, path, False, stated)  # type: ignore[arg-type]
         return
     if _is_rows_by_key(value):  # of rows that are numbered the keys say nothing
@@ -173,6 +177,11 @@ def _is_rows_by_key(value: Mapping[str, Json]) -> bool:
 def _counts(value: Mapping[str, Json]) -> bool:
     """Return True if the keys of a column number its values."""
     return all(key == str(number) for number, key in enumerate(value))
+
+
+def _numbers_rows(index: list[Json]) -> bool:
+    """Return True for an index that merely numbers the rows."""
+    return all(type(value) is int and value == at for at, value in enumerate(index))
 
 
 def _is_text(values: list[Json]) -> bool:

@@ -26,6 +26,7 @@ from dearig.recording.importers.formats.text_lines import (
     rises,
     scales_in,
     with_brackets,
+    with_labels,
 )
 from dearig.recording.importers.quantities.labels import label_of
 from dearig.recording.importers.quantities.moments import (
@@ -216,6 +217,9 @@ class _Table:
         if self.cells > COLUMNS_MAX:
             raise _too_wide(path, self.cells)
         line, names, units = self._names(path, names_line)
+        if names_line is None:
+            above = [i for i in range(self.start, self.first) if self.lines[i].strip()]
+            line, names = with_labels({i: self._split(i) for i in above}, line, names)
         self._check_commas(path, line, names)
         names = self._behind_row_names(path, names)
         if self.labview:

@@ -6,11 +6,12 @@ import codecs
 import csv
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from dearig.errors import InputError
 from dearig.recording.importers.quantities.labels import has_east_asian_name
+from dearig.recording.importers.quantities.units import unit_of
 
 __all__ = [
     "HEADER_LINES",
@@ -22,6 +23,7 @@ __all__ = [
     "rises",
     "scales_in",
     "with_brackets",
+    "with_labels",
 ]
 
 #: Lines above a table in which names are looked for, and lines of a name in quotes, at most.
@@ -144,6 +146,39 @@ def scales_in(cells: Sequence[str], width: int) -> dict[int, str]:
         for place, match in enumerate(matches)
         if match is not None and float(match[1]) != 1.0
     }
+
+
+#: The first cell of a line with the labels that an oscilloscope's user gave the channels.
+_LABELS = re.compile(r"(channel|curve|trace|kanal)?[ _-]?(labels?|bezeichnung(en)?):?", re.I)
+
+
+def with_labels(
+    above: Mapping[int, list[str]], line: int, names: list[str]
+) -> tuple[int, list[str]]:
+    """Return the line of the ``names``, and these with the labels that a line before them gives.
+
+    ``above`` are the cells of the lines above a table. An oscilloscope writes ``Labels,HV,Laser``
+    above ``TIME,CH1,CH2``.
+    """
+    labelled = next((i for i, cells in above.items() if _are_labels(cells)), line)
+    below = next((i for i in above if i > line), line) if labelled == line else line
+    if line < 0 or labelled >= below or not _are_labels(above[labelled]):
+        return line, names
+    labels, own = above[labelled], names if below == line else above[below]
+    if len(own) < len(labels) or unit_of(own[1]) is not None:
+        return line, names
+    pairs = itertools.zip_longest(labels[1:], own[1:], fillvalue="")
+    return below, [own[0], *(label or name for label, name in pairs)]
+
+
+def _are_labels(cells: Sequence[str]) -> bool:
+    """Return True if ``cells`` are the word label, and labels behind it that are no numbers."""
+    return (
+        len(cells) > 1
+        and any(cells[1:])
+        and _LABELS.fullmatch(cells[0]) is not None
+        and not any(map(_PLAIN.fullmatch, cells[1:]))
+    )
 
 
 def rises(cells: Sequence[str]) -> bool:
