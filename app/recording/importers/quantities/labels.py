@@ -65,7 +65,7 @@ def _plain(text: str) -> str:
 _WORDS = MappingProxyType(
     {
         "time": "time zeit temps timestamp timestamps zeitstempel datetime elapsed t tiempo tempo "
-        "tijd tid czas cas время",
+        "tijd tid czas cas prufdauer versuchsdauer messdauer время",
         "voltage_monitor": "monitor moniteur vmon",
         "voltage": "voltage volt volts spannung tension hv highvoltage hochspannung u v potential "
         "potentiel voltaje tensione tensao spanning napiecie napeti напряжение",
@@ -90,7 +90,10 @@ for _quantity, _names in _WORDS.items():
     for _word in _names.split():
         _QUANTITIES_OF.setdefault(_word, []).append(_quantity)
 #: Ends of German names that are written together.
-_ENDS = ("kraft", "spannung", "weg", "zeit", "dehnung", "strom", "verschiebung", "temperatur")
+_ENDS = (
+    "kraft", "spannung", "weg", "zeit", "dehnung", "strom", "verschiebung", "temperatur",
+    "position",
+)  # fmt: skip
 
 #: Ends of Chinese and Japanese names, by quantity; what ends another one is after it.
 _EAST_ASIAN = MappingProxyType(

@@ -52,15 +52,16 @@ _HARMLESS = _set(
     fluke matsusada spellman ultravolt hamamatsu philtec polytec omron panasonic epsilon micro
     optoncdt instron zwick mts linkam futek daq rig lab messwert col column spalte
     grad deg percent prozent trace curve series waveform left right top bottom front back
-    dose axis kraftaufnehmer wegaufnehmer links rechts oben unten"""
+    dose axis kraftaufnehmer wegaufnehmer links rechts oben unten traversen querhaupt kolben
+    zylinder verfahr dehn fein techn versuchs"""
 )
 #: Words that are harmless before some quantities only.
 _HARMLESS_FOR = MappingProxyType(
     {
         "voltage": _set("command commanded cmd"),
         "nominal_stress": _set("nominal nenn pk piola"),
-        "strain": _set("nominal nenn"),
-        "stretch": _set("nominal nenn"),
+        "strain": _set("nominal nenn nominelle"),
+        "stretch": _set("nominal nenn nominelle"),
     }
 )
 #: Quantities whose names have any words before them: room temperature, test time. Words that make
