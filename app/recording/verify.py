@@ -411,7 +411,7 @@ class _Check:
         if clocks.step:
             self.found.notes.append(
                 f"the computer's clock was set {'forward' if clocks.step > 0.0 else 'back'} by "
-                f"{abs(clocks.step):.4g} s during the run, or the computer slept, at sample "
+                f"{_duration(abs(clocks.step))} during the run, or the computer slept, at sample "
                 f"{clocks.step_sample} ({clocks.step_sample / rate:.4g} s); the sample clock is "
                 f"not affected"
             )
@@ -517,3 +517,10 @@ class _Check:
                 scales = list(row.dims[0].values())
                 if scales != [plot["time"]]:
                     self.fault(f"the dimension scale of {row.name} is not time")
+
+
+def _duration(seconds: float) -> str:
+    """Return a duration in the unit in which it is a number of few digits: 24 h, 3.5 s."""
+    units = ((2.0 * 86_400.0, 86_400.0, "days"), (7200.0, 3600.0, "h"), (120.0, 60.0, "min"))
+    of, unit = next(((of, unit) for least, of, unit in units if seconds >= least), (1.0, "s"))
+    return f"{seconds / of:.4g} {unit}"

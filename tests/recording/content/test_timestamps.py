@@ -62,12 +62,15 @@ def run(path: Path, steps: dict[int, float], clock_rate: float = 1.0) -> Verific
     return verify(path)
 
 
-@pytest.mark.parametrize("step", [0.7, 3600.0, 1e8])
-def test_a_clock_that_is_set_forward_is_a_note(tmp_path: Path, step: float) -> None:
+@pytest.mark.parametrize(
+    ("step", "shown"),
+    [(0.7, "0.7 s"), (119.0, "119 s"), (3600.0, "60 min"), (86_400.0, "24 h"), (1e8, "1157 days")],
+)
+def test_a_clock_that_is_set_forward_is_a_note(tmp_path: Path, step: float, shown: str) -> None:
     found = run(tmp_path / "run.h5", {14: step})
     assert found.faults == []
     assert found.notes == [
-        f"the computer's clock was set forward by {step:.4g} s during the run, or the computer "
+        f"the computer's clock was set forward by {shown} during the run, or the computer "
         f"slept, at sample 1400 (14 s); the sample clock is not affected"
     ]
 

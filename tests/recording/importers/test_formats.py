@@ -111,7 +111,7 @@ def test_what_is_wrong_in_json(tmp_path: Path) -> None:
     same(taken(path))  # they are the same
     other = {name: [2 * value for value in column] for name, column in as_columns().items()}
     path.write_text(json.dumps({"first": other, "second": as_columns()}), "utf-8")
-    with refused("one is taken: first, second"):
+    with refused("one must be chosen: first, second"):
         imported(path)
     same(taken(path, table="second"))
     for text, match in (
@@ -191,7 +191,7 @@ def test_groups_of_an_hdf5_file_are_chosen_from(tmp_path: Path) -> None:
         file["run3/time_s"] = TIME
 
     path = hdf5(tmp_path / "in.h5", content)
-    with refused("one is taken: run1, run2"):
+    with refused("one must be chosen: run1, run2"):
         imported(path)
     same(taken(path, table="run2"))
     columns = {name: f"run2/{name}" for name in NAMES}
@@ -221,7 +221,7 @@ def turned(file: h5py.File) -> None:
 def test_mat_of_version_7_3(tmp_path: Path) -> None:
     head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
     path = hdf5(tmp_path / "in.mat", refs, head)
-    with refused(r"one is taken: run\(1\), run\(2\)"):
+    with refused(r"one must be chosen: run\(1\), run\(2\)"):
         imported(path)
     same(taken(path, table="run(2)"))
     path = hdf5(path, turned, head)

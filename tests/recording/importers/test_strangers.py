@@ -218,3 +218,17 @@ def test_an_unknown_unit_beside_a_known_one_is_asked(tmp_path: Path) -> None:
         imported(path)
     assert label_of("Strain (in/in)").unit == "1"
     same(taken(path, columns={"voltage_V": "Voltage (V)"}))
+
+
+@pytest.mark.parametrize("epoch", [1.7e9, 3.9e9])
+@pytest.mark.parametrize(
+    ("at", "stamp", "said"),
+    [(40, 0.38, "goes back, from 0.39 to 0.38"), (40, 0.39, "stands still, from 0.39 to 0.39")],
+)
+def test_times_since_an_epoch_are_shown_from_the_first_row(
+    tmp_path: Path, epoch: float, at: int, stamp: float, said: str
+) -> None:
+    stamps = [f"{epoch + t:.2f}" for t in TIME]
+    stamps[at] = f"{epoch + stamp:.2f}"
+    with refused(f"line {at + 2}, column 'Time .s.': time {said} since the first row"):
+        imported(write(tmp_path, stamps, VOLTAGE, 1e3 * MOVED))

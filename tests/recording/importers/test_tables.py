@@ -62,7 +62,7 @@ def test_a_sheet_is_chosen_or_asked_for(tmp_path: Path) -> None:
         Second=rows(table=2 * TABLE),
         Summary=rows(("run", "peak_kV"), np.array([[1, 2.3], [2, 4.6]])),
     )
-    with refused(r"one is taken: First, Second\)\. Put .* TABLE, and run: .* --table TABLE$"):
+    with refused(r"one must be chosen: First, Second\)\. Put .* TABLE, and run: .* --table TABLE$"):
         imported(path)
     np.testing.assert_allclose(taken(path, table="Second").time, 2 * TIME)
     with refused("no table 'Secnd'; there are: First, Second, Summary; did"):
@@ -91,7 +91,7 @@ def test_specimens_side_by_side_are_chosen_from(tmp_path: Path, suffix: str) -> 
         lines = [",".join("" if c is None else str(c) for c in row) for row in [*head, *body]]
         path.write_text("\n".join(lines), "utf-8")
     size = {"gauge_length_mm": 30.0, "area_mm2": 18.0}
-    with refused("one is taken: Specimen 1, Specimen 2"):
+    with refused("one must be chosen: Specimen 1, Specimen 2"):
         imported(path, **size)
     one, two = taken(path, **size, table="Specimen 1"), taken(path, **size, table="Specimen 2")
     np.testing.assert_allclose(one.nominal_stress, FILM[:, 2] / 18e-6)
@@ -108,7 +108,7 @@ def test_specimens_one_below_another_are_chosen_from(tmp_path: Path, encoding: s
     parts = [["Prüfling\tA"], names, first, ["", "Prüfling\tB", "Prüfer\tme"], names, second]
     path.write_text("\n".join(line for part in parts for line in part), encoding)
     size = {"gauge_length_mm": 30.0, "area_mm2": 18.0}
-    with refused("one is taken: Prüfling A, Prüfling B"):
+    with refused("one must be chosen: Prüfling A, Prüfling B"):
         imported(path, **size)
     assert [column.table for column in preview(path)] == [*["Prüfling A"] * 3, *["Prüfling B"] * 3]
     one = taken(path, **size, table="Prüfling A")

@@ -96,7 +96,10 @@ def choose(
     if len(parts) > 1 and name != default:
         found.table_choices = tuple(parts)
         found.unsure.append(
-            Note(f"there are several tables, and one is taken: {listing([*parts])}", option="table")
+            Note(
+                f"there are several tables, of which one must be chosen: {listing([*parts])}",
+                option="table",
+            )
         )
     elif len(tables) > 1:
         found.notes.append(f"of {len(tables)} tables, {name!r} was taken")

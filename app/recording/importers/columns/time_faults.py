@@ -17,6 +17,8 @@ _DAY, _NEXT_DAY, _SUMMER = 86_400.0, 43_200.0, 3600.0
 #: Usual steps from which a step is a jump, and jumps that are named at most: more are the pauses
 #: of a logger that writes when something happens.
 _JUMP, _JUMPS_MAX = 100.0, 3
+#: Durations of a recording before its first row from which its times count from that row.
+_LONG_BEFORE = 100.0
 #: Steps from which the usual one is found, at most, and steps that are looked at in one go.
 _SOME = 2**17
 
@@ -67,7 +69,7 @@ def jumps(time: np.ndarray, place: Callable[[int], str]) -> list[str]:
         if len(found) > _JUMPS_MAX:
             return []
     return [
-        f"the time jumps by {step:g} s after {place(at)}, and goes on in steps of {usual:g} s: "
+        f"the time jumps by {step:.7g} s after {place(at)}, and goes on in steps of {usual:.5g} s: "
         + (
             "did summer time begin?"
             if abs(step - _SUMMER - usual) <= 0.5 * usual
@@ -97,8 +99,11 @@ def check_forward(time: np.ndarray, column: str, place: Callable[[int], str], pa
     if (back := not_forward(time)) is None:
         return
     at, how = back
-    said = f"{path}, {place(at)}, column {column!r}: time {how}, from {time[at - 1]:.9g} to "
-    said += f"{time[at]:.9g}"
+    first, behind = _counted_from(time)
+    # the digits behind those are of the rounding of the difference
+    one, other = (round(float(t - first), 6) if behind else t for t in time[at - 1 : at + 1])
+    said = f"{path}, {place(at)}, column {column!r}: time {how}, from {one:.9g} to {other:.9g}"
+    said += behind
     if (shared := _shared(time)) is not None:
         rows, rate = shared
         raise NeedsOptionError(
@@ -110,6 +115,17 @@ def check_forward(time: np.ndarray, column: str, place: Callable[[int], str], pa
     lost = time.size - int(forward_rows(time).sum())
     more = "; a rate replaces the time of evenly spaced samples"
     raise skip_or_refuse(said, lost, time.size, more, option=["rate_Hz"])
+
+
+def _counted_from(time: np.ndarray) -> tuple[float, str]:
+    """Return what times (n,) are shown from, and the words for it: 0, or the first row.
+
+    Of seconds since 1904 or 1970 the digits that differ would not be seen.
+    """
+    forward = (steps := np.diff(time))[steps > 0.0]
+    whole = float(np.median(forward)) * time.size if forward.size else 0.0
+    first = float(time[0])
+    return (first, " since the first row") if abs(first) > _LONG_BEFORE * whole > 0.0 else (0.0, "")
 
 
 def _shared(time: np.ndarray) -> tuple[float, str] | None:
