@@ -10,7 +10,14 @@ from dearig.drivers.registry import Registry
 from dearig.drivers.rig_kind import RigKind, RigOptions
 from dearig.errors import InputError
 
-__all__ = ["RIGS", "check_address", "is_simulated", "kind_of", "options_of"]
+__all__ = [
+    "RIGS",
+    "check_address",
+    "check_simulation",
+    "is_simulated",
+    "kind_of",
+    "options_of",
+]
 
 
 def _check(name: str, kind: Any) -> None:
@@ -66,6 +73,21 @@ def check_address(address: str, rig_file: RigFile, options: RunOptions) -> RigKi
             option="rig_file",
         )
     return kind
+
+
+def check_simulation(address: str, seed: int | None, paced: bool) -> None:
+    """Raise ``InputError`` for a seed or a pace that a person gave for a rig that is not simulated.
+
+    A ``seed`` of None was not given, and one of 0 is the default.
+    """
+    asked = {"seed": bool(seed), "paced": paced}
+    given = [name for name, is_given in asked.items() if is_given]
+    if given and not kind_of(address).simulated:
+        raise InputError(
+            f"rig {address!r} is not simulated; a seed of the noise and a simulation in real time "
+            f"are for simulated rigs: leave them out",
+            option=given,
+        )
 
 
 def is_simulated(address: str) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dearig.acquisition.rigs import check_simulation
 from dearig.acquisition.run import RunOptions
 from dearig.analysis import hold as holding
 from dearig.analysis.hold import HoldOptions
@@ -154,6 +155,7 @@ def hold(
     >>> held = dearig.hold(0.5, "model.toml", seconds=60.0, out="hold.h5")
     >>> held.rms_um
     """
+    check_simulation(rig, seed, paced)
     settings, text = load_rig(rig_file)
     outcome = holding.hold(
         displacement_mm * 1e-3, seconds, read_model(model), rig, settings, Path(out),

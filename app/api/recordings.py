@@ -15,6 +15,7 @@ import tomli_w
 
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rig_source import SOURCE, source_of
+from dearig.acquisition.rigs import check_simulation
 from dearig.acquisition.run import RunOptions
 from dearig.acquisition.run import record as run
 from dearig.analysis.readings.compatibility import of_rig
@@ -252,6 +253,7 @@ def record(
     >>> run = dearig.record("thesis", rig="sim:2003", path="run.h5")
     >>> run.plot()
     """
+    check_simulation(rig, seed, paced)
     settings, text = load_rig(rig_file)
     loaded = as_loaded(sequence)
     actuator = None

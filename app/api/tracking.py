@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dearig.acquisition.rigs import check_simulation
 from dearig.acquisition.run import RunOptions
 from dearig.analysis.track import track as follow
 from dearig.analysis.track_target import plan_target
@@ -328,6 +329,7 @@ def track(
     >>> followed = dearig.track("target.toml", "model.toml", out="runs")
     >>> followed.plot("errors")
     """
+    check_simulation(rig, seed, paced)
     settings, text = load_rig(rig_file)
     outcome = follow(
         _target(target), read_model(model), rig, settings, Path(out),

@@ -9,6 +9,7 @@ from pathlib import Path
 from dearig.batch.journal import JOURNAL, REQUESTS, append_line
 from dearig.batch.queue import WAITING, Queue
 from dearig.errors import InputError
+from dearig.units import counted
 
 __all__ = ["ask"]
 
@@ -17,13 +18,19 @@ def ask(folder: Path, requests: Sequence[tuple[str, str]], by: str = "") -> None
     """Append ``requests`` to the requests of the campaign in ``folder``.
 
     Each is one of ``REQUEST_KINDS`` and the name of a run, "" where it needs none. Raises
-    ``InputError`` for a folder without a campaign, and for a run that does not wait.
+    ``InputError`` for a folder without a campaign, for a campaign that has no run left, and for a
+    run that does not wait.
     """
     queue = Queue.of(folder / JOURNAL) if folder.is_dir() else Queue()
     if not queue.runs:
         raise InputError(f"{folder} has no campaign: there is no journal {JOURNAL}")
-    for _, name in requests:
+    for what, name in requests:
         if not name:
+            if not queue.waiting and queue.running is None:
+                raise InputError(
+                    f"the campaign in {folder} is finished: none of its "
+                    f"{counted(len(queue.runs), 'run')} waits, so there is nothing to {what}"
+                )
             continue
         run = queue.runs.get(name)
         if run is None:

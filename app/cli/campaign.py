@@ -123,6 +123,7 @@ def campaign(
     Ctrl-C ramps the voltage down to 0 V and ends the campaign; --resume continues it.
     """  # fmt: skip
     from dearig.acquisition.rig_source import SOURCE
+    from dearig.acquisition.rigs import check_simulation
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.readings.compatibility import of_rig
     from dearig.batch.campaign import Arming, play_campaign
@@ -139,6 +140,7 @@ def campaign(
     )
 
     check_files(force, (plan, rig_file, model), json=json)
+    check_simulation(rig, seed, paced)
     loaded, (settings, text, provenance) = load_campaign(plan), rig_settings(rig_file)
     actuator = None
     if model is not None:

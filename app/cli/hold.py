@@ -106,6 +106,7 @@ def hold(
     is output. Ctrl-C ramps the voltage down to 0 V and keeps what was recorded.
     """
     from dearig.acquisition.rig_source import SOURCE, film_differences
+    from dearig.acquisition.rigs import check_simulation
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.hold import HoldOptions, actuator_of, check_hold, plan_hold
     from dearig.analysis.hold import hold as run
@@ -115,6 +116,7 @@ def hold(
     length = _seconds(duration)
     written = () if out is None else (out,)
     check_files(force, (model, rig_file), *written, json=json, recording=out)
+    check_simulation(rig, seed, paced)
     (settings, text, provenance), ours = rig_settings(rig_file), load_model(model)
     run_options = RunOptions(
         text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=fault or (),

@@ -118,7 +118,7 @@ def record(
     """
     from dearig.acquisition.overlay import OverlayModel
     from dearig.acquisition.rig_source import SOURCE
-    from dearig.acquisition.rigs import kind_of
+    from dearig.acquisition.rigs import check_simulation, kind_of
     from dearig.acquisition.run import RunOptions
     from dearig.acquisition.run import record as run
     from dearig.analysis.readings.compatibility import of_rig
@@ -142,6 +142,7 @@ def record(
         settings, text, provenance = rig_settings(rig_file)
     if original is not None:
         provenance |= {"repeats": f"{like}"}
+    check_simulation(rig, seed, paced)
     if seed is None:
         seed = original.seed if original is not None and simulated else 0
     differing: tuple[str, ...] = ()

@@ -111,6 +111,7 @@ def track(
     done.
     """
     from dearig.acquisition.rig_source import SOURCE, film_differences
+    from dearig.acquisition.rigs import check_simulation
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.track import track as follow
     from dearig.analysis.track_target import check_feasible, plan_target
@@ -120,6 +121,7 @@ def track(
     from dearig.report.pages.track import track_json, write_track_report
 
     check_files(force, (target, model, compare, rig_file), json=json)
+    check_simulation(rig, seed, paced)
     loaded, (settings, text, provenance) = load_target(target), rig_settings(rig_file)
     ours = load_model(model)
     actuator = load_actuator(model)  # refuses that of a bare film

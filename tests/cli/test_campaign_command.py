@@ -121,6 +121,22 @@ def test_a_card_without_a_film_leaves_nothing_behind(given, tmp_path: Path) -> N
 
 
 def test_what_is_asked_of_a_campaign_that_nobody_plays_says_so(given, tmp_path: Path) -> None:
-    done("campaign", *given)
+    done("campaign", *given, "--runs", 1)
     answer = done("campaign-queue", tmp_path / "out", "--end")
     assert "asked to end; it takes effect when the campaign is continued" in answer.out
+
+
+def test_a_campaign_that_is_finished_cannot_be_ended(given, tmp_path: Path) -> None:
+    done("campaign", *given)
+    for request in ("end", "pause", "continue"):
+        answer = dearig("campaign-queue", tmp_path / "out", f"--{request}")
+        refused(answer, f"is finished: none of its 3 runs waits, so there is nothing to {request}")
+
+
+@pytest.mark.parametrize("option", [("--seed", 5), ("--paced",)])
+def test_what_only_a_simulated_rig_takes_is_refused_for_a_card(
+    given, tmp_path: Path, option: tuple[str, ...]
+) -> None:
+    answer = dearig("campaign", *given, "--rig", "daqmx:Dev1", *option)
+    refused(answer, "'daqmx:Dev1' is not simulated", option[0])
+    assert not (tmp_path / "out").exists()

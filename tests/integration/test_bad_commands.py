@@ -37,6 +37,14 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
         "record {s}/lobe.toml --out o.h5 --rig daqmx:Dev1",
         ["daqmx:Dev1", "no film is declared", "--rig-file"],
     ),
+    "a seed for a real card": (
+        "record {s}/lobe.toml --out o.h5 --rig daqmx:Dev1 --seed 5",
+        ["'daqmx:Dev1' is not simulated", "leave them out (--seed)"],
+    ),
+    "a pace for a real card": (
+        "record {s}/lobe.toml --out o.h5 --rig daqmx:Dev1 --paced",
+        ["'daqmx:Dev1' is not simulated", "leave them out (--paced)"],
+    ),
     "a seed that is none": (
         "record {s}/lobe.toml --out o.h5 --rig sim:x",
         ["'sim:x' is not a simulated rig", "sim:7"],
