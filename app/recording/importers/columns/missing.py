@@ -85,16 +85,17 @@ def without_readings(
         gaps |= other
         found[quantity] = np.where(gaps, np.nan, column)[good]
         name, rows = picked[quantity].column, int(good.sum())
+        at = int(np.argmax(other if other.any() else gaps))
+        cell = getattr(source, "cell", None)
+        why = "" if cell is None else cell(at, name)
         if (left := rows - int(gaps.sum())) < _READINGS_MIN:
             raise InputError(
                 f"{source.path}: column {name!r} has {counted(left, 'number')} in "
-                f"{counted(rows, 'row')}, and at least {_READINGS_MIN} are needed: is it the right "
-                f"column?"
+                f"{counted(rows, 'row')}, and at least {_READINGS_MIN} are needed"
+                f"{why and f' ({source.row(at)}: {why})'}: is it the right column?"
             )
         if count := int(other.sum()):
-            at, one = int(np.argmax(other)), count == 1
-            cell = getattr(source, "cell", None)
-            why = "" if cell is None else cell(at, name)
+            one = count == 1
             warnings.append(
                 f"{count:,} of {counted(rows, 'reading')} of {name!r} {'is' if one else 'are'} "
                 f"missing, {'' if one else 'first '}in {source.row(at)}{why and f' ({why})'}: no "
