@@ -22,6 +22,7 @@ from dearig.recording.reading.recording import RecordedEvent
 
 __all__ = [
     "RECENT",
+    "STALE",
     "Bins",
     "RecordingWatch",
     "Seen",
@@ -33,6 +34,9 @@ __all__ = [
 
 #: Samples that are read at one look: some 30 MB.
 _MOST = 1_000_000
+#: Age in s of the newest sample above which the values are not those of now: eight flushes of a
+#: recording, as on the web page.
+STALE = 2.0
 #: Time in s of which the newest part of every channel is kept.
 RECENT = 20.0
 #: Bins of the newest part and of the whole run: a line of 800 ends fills the width of a screen.
@@ -156,7 +160,8 @@ class Seen:
     channel, ``described`` their units and labels. ``recent`` and ``whole`` have their extremes over
     the last seconds and over the run. ``events`` are the last ones. ``ended``: no samples follow,
     and ``outcome`` says how the run ended. ``abandoned``: the run was killed. ``changed`` is the
-    monotonic time in s at which the newest sample was written.
+    monotonic time in s at which the newest sample was written, and ``age`` its age in s at the
+    last look, None where there is no sample.
     """
 
     path: Path
@@ -176,6 +181,12 @@ class Seen:
     abandoned: bool = False
     trouble: str = ""
     changed: float = -math.inf
+    age: float | None = None
+
+    @property
+    def live(self) -> bool:
+        """True while the values are those of this moment: samples come, and the run goes on."""
+        return not (self.ended or self.abandoned) and self.age is not None and self.age <= STALE
 
 
 class RecordingWatch:
@@ -209,9 +220,11 @@ class RecordingWatch:
                 news = self._follower.look(_MOST, newest=True)
         except InputError as error:
             self.state.trouble = str(error)
-            return self.state
-        self._identifier = news.identifier
-        self._take(news)
+        else:
+            self._identifier = news.identifier
+            self._take(news)
+        changed = self.state.changed
+        self.state.age = None if changed == -math.inf else self._clock() - changed
         return self.state
 
     def _take(self, news: News) -> None:

@@ -165,9 +165,13 @@ def _recording_lines(state: Seen, ascii_only: bool) -> Iterator[RenderableType]:
 
     from dearig.batch.watching import RECENT
     from dearig.printable import printable
+    from dearig.report.pages.campaign import duration_text
     from dearig.report.pages.watch_state import in_order, shown_channel
 
     how = "ended" if state.ended else "killed" if state.abandoned else "recording"
+    if how == "recording" and state.age is not None and not state.live:
+        age = duration_text(state.age) if state.age > 600.0 else f"{state.age:.0f} s"
+        how = f"no new data for {age}"
     simulated = ", simulated" if state.simulated else ""
     yield Text()
     yield Text(
@@ -175,6 +179,9 @@ def _recording_lines(state: Seen, ascii_only: bool) -> Iterator[RenderableType]:
     )
     if state.trouble:
         yield Text(printable(state.trouble), style="yellow")
+    if state.now and not state.live:
+        look = "" if state.ended else "; look at the amplifier: its voltage now is not known here"
+        yield Text(f"  not live, these are the last samples{look}", style="yellow")
     for name in in_order(state):
         shown = shown_channel(name, state.described)
         now, peak = shown.text(state.now[name]), shown.text(state.peak[name])

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
-from dearig.batch.watching import RecordingWatch
+from dearig.batch.watching import RecordingWatch, SourceWatch
+from dearig.cli.watch import _look
 from dearig.drivers.rig import Block, Event
+from dearig.report.pages.watch_state import watch_json
 from tests.tools.command import dearig, done, refused
 from tests.tools.played import Bench, Killed
-from tests.tools.recordings import run_counts, writer
+from tests.tools.recordings import Clock, run_counts, writer
 
 
 def test_a_watcher_sees_what_was_flushed_and_the_end(tmp_path: Path) -> None:
@@ -34,6 +38,37 @@ def test_a_watcher_sees_what_was_flushed_and_the_end(tmp_path: Path) -> None:
     state = watch.look()
     assert (state.samples, state.ended) == (3000, True)
     assert state.recent["displacement"].extremes[0].size > 10
+
+
+def test_values_of_a_run_that_writes_no_more_are_not_those_of_now(
+    tmp_path: Path,
+) -> None:
+    # a frozen run: its guardian has set 0 V, and the file still ends at full voltage
+    path, clock = tmp_path / "run.h5", Clock(100.0)
+    recorder = writer(path)
+    recorder.append(Block(0, run_counts(3000)[:, :1500]))
+    recorder._flush_all(1.8e9)
+    watch = SourceWatch(path)
+    watch._watch = RecordingWatch(path, now=lambda: 1.8e9, clock=clock)
+
+    def shown() -> str:
+        stream = StringIO()
+        console = Console(file=stream, width=120)
+        console.print(_look(watch, console))
+        return stream.getvalue()
+
+    assert "recording, 1.5 s" in shown()
+    assert "not live" not in shown()
+    assert watch_json(watch)["recording"]["live"] is True
+    clock.moment += 6.0
+    assert "no new data for 6 s, 1.5 s" in shown()
+    assert "not live, these are the last samples; look at the amplifier" in shown()
+    found = watch_json(watch)["recording"]
+    assert (found["live"], found["age_s"]) == (False, pytest.approx(6.0))
+    recorder.close()
+    assert "ended" in shown()
+    assert "not live, these are the last samples" in shown()
+    assert watch_json(watch)["recording"]["live"] is False
 
 
 def test_a_file_that_is_not_there_yet_is_no_end_of_the_watch(tmp_path: Path) -> None:

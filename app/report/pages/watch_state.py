@@ -69,6 +69,8 @@ def watch_json(watch: SourceWatch) -> dict[str, Any]:
             "duration_s": state.duration or None,
             "ended": state.ended,
             "outcome": state.outcome or None,
+            "age_s": state.age,
+            "live": state.live,
             "now": state.now,
             "peak": state.peak,
             "events": [
