@@ -45,6 +45,7 @@ _CLOCK = 1.0  # s between two looks at the computer's clock
 _TICK = 250  # ms between two updates of the countdown
 _KEY = "alarm"  # of the settings; with the address of the rig
 _BLOCK = "alarm"  # of the session
+_ELSEWHERE = "played elsewhere"  # the same
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ class HighVoltageStatus(QObject):
     it; None where this program has not contacted that rig. ``reading`` belongs to the rig and to
     the run ``run_number``: both change with each run that begins, and with the rig. A latched
     ``alarm`` blocks arming. It is kept in the settings for a rig that is not simulated, so that
-    another start of the program shows it again.
+    another start of the program shows it again. While another window of this computer plays on the
+    rig, the state is unknown here and nothing is armed; the output is then to be read again.
     ``disarm_due`` comes when the time to start an armed rig is over. An armed rig can be started
     once the state ARMED has been on the screen for twice the time of a reaction, which
     ``start_opened`` tells: ``may_start``.
@@ -137,10 +139,13 @@ class HighVoltageStatus(QObject):
         self._silence = 0  # whole s without a sample, 0 while they come
         self.run_number = 0
         self._lock: QLockFile | None = None  # while a run goes on
+        self._elsewhere = ""  # time of day from which on another window was seen to play
+        self._unread = "the voltage was not read yet"
         self.alarm: LatchedAlarm | None = None
         session.rig_changed.connect(self._rig_changed)
         session.output_read.connect(self.set_read_at_rest)
         self._restore()
+        self._look_elsewhere()
 
     @property
     def state(self) -> HighVoltage:
@@ -195,9 +200,14 @@ class HighVoltageStatus(QObject):
             words = f"not started yet; disarms in {self.seconds_to_start} s"
         elif self.live:
             words = self.silence
+        elif self._elsewhere:
+            words = (
+                f"another window plays on this rig, seen at {self._elsewhere}: its voltage is "
+                f"shown there, and STOP works there only"
+            )
         else:
             output = self.output
-            words = "the voltage was not read yet" if output is None else output.sentence
+            words = self._unread if output is None else output.sentence
             if output is not None and output.at > time.time() + TOLERANCE:
                 words = f"{words}; the computer's clock was set back since then"
             if self._state is HighVoltage.BETWEEN:
@@ -275,6 +285,7 @@ class HighVoltageStatus(QObject):
     def set_output(self, output: OutputState) -> None:
         """Set what was measured of the output at the end of a run, also before the run's end."""
         self._output, self._address, self._is_final = output, self._session.address, True
+        self._unread = "the voltage was not read yet"
         self._refresh()
 
     @Slot(object)
@@ -317,11 +328,17 @@ class HighVoltageStatus(QObject):
             self._silence = silence
             self.changed.emit()
 
-    def run_begins(self) -> None:
-        """Keep a note of the run, for a start of the program after this one has died in it."""
+    def run_begins(self) -> bool:
+        """Keep a note of the run, for a start of the program after this one has died in it.
+
+        Returns False where another window of this computer plays on the rig: it has its own note.
+        """
         if not is_simulated(self._session.address):
-            self._lock = self._lock_of(self._session.address)
-            self._lock.tryLock(0)
+            lock = self._lock_of(self._session.address)
+            if _is_held(lock):
+                self._look_elsewhere()
+                return False
+            self._lock = lock
         self._keep(
             LatchedAlarm(
                 # shown with the time that follows it, which is that of the start
@@ -332,6 +349,7 @@ class HighVoltageStatus(QObject):
             ),
             QSettings.sync,  # there is no voltage yet, so that it may take its time
         )
+        return True
 
     def run_ended(self, alarm: LatchedAlarm | None) -> None:
         """Latch ``alarm``; None for a run that ended as it should."""
@@ -376,6 +394,8 @@ class HighVoltageStatus(QObject):
     def _shown(self) -> HighVoltage:
         if self._phase is HighVoltage.ARMED or self.live:
             return self._phase or HighVoltage.UNKNOWN
+        if self._elsewhere:
+            return HighVoltage.UNKNOWN
         output = self.output
         if self._phase is HighVoltage.BETWEEN and (output is None or output.confirmed):
             return HighVoltage.BETWEEN
@@ -393,6 +413,7 @@ class HighVoltageStatus(QObject):
     @Slot()
     def _look_at_clock(self) -> None:
         """Say that the computer's clock was set: the bar shows times of day."""
+        self._look_elsewhere()
         if change := self._clock_watch.change():
             log.warning("%s", change)
             self._session.message.emit(f"{change[0].upper()}{change[1:]}")
@@ -405,7 +426,43 @@ class HighVoltageStatus(QObject):
             self._forget_numbers()
             if self.alarm is None:
                 self._restore()
+            self._look_elsewhere()
             self._refresh()
+
+    def _look_elsewhere(self) -> None:
+        """Look whether another window of this computer plays on the rig of the session.
+
+        What this window has measured is then no longer so, and it arms nothing.
+        """
+        lock = None if self._lock is not None else self._lock_file(self._session.address)
+        played = lock is not None and _is_held(lock)
+        if lock is not None and not played:
+            lock.unlock()  # of a window that was killed in its run
+        elif played == bool(self._elsewhere):
+            return
+        self._forget_numbers()
+        self._output = None
+        if played:
+            self._elsewhere = _clock(time.time())
+            self._session.block(
+                _ELSEWHERE, "another window of this computer plays on this rig: wait for its end"
+            )
+        else:
+            self._elsewhere = ""
+            self._unread = "the voltage was not read since another window played on this rig"
+            self._session.unblock(_ELSEWHERE)
+            if self.alarm is None:
+                self._session.settings.sync()  # what the other window has left
+                self._restore()
+        self._refresh()
+
+    def _lock_file(self, address: str) -> QLockFile | None:
+        """Return the lock of the rig at ``address`` where a window holds it or was killed with it.
+
+        Without its file no one holds it, and to take it would be in the way of who wants to.
+        """
+        lock = None if is_simulated(address) else self._lock_of(address)
+        return lock if lock is not None and Path(lock.fileName()).exists() else None
 
     # the settings
 
@@ -417,6 +474,9 @@ class HighVoltageStatus(QObject):
         address = self._session.address if self.alarm is None else self.alarm.address
         if is_simulated(address):
             return
+        lock = None if self._lock is not None else self._lock_file(address)
+        if lock is not None and _is_held(lock):
+            return  # the note there is that of another window, which plays
         key = f"{_KEY}/{address}"
         if alarm is None:
             self._session.settings.remove(key)
@@ -457,6 +517,11 @@ class HighVoltageStatus(QObject):
         with contextlib.suppress(OSError):  # a folder that cannot be made locks nothing
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         return lock_of(folder / hashlib.sha256(address.encode()).hexdigest()[:16])
+
+
+def _is_held(lock: QLockFile) -> bool:
+    """Take ``lock``; return whether another process holds it, and not only that no file can be."""
+    return not lock.tryLock(0) and lock.error() is QLockFile.LockError.LockFailedError
 
 
 def _now() -> float:

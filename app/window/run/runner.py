@@ -205,11 +205,13 @@ class Runner(QObject):
     def begin(self, thread: PlayThread, play: Play) -> bool:
         """Begin what ``thread`` plays; return False if the rig is not armed for ``play``.
 
-        Before the operator can have seen that it is armed, nothing is begun either.
+        Before the operator can have seen that it is armed, nothing is begun either, nor while
+        another window plays on the rig.
         """
         if self.running or not self.armed_for(play) or not self.status.may_start:
             return False
-        self.status.run_begins()
+        if not self.status.run_begins():
+            return False
         self._thread, self.playing = thread, play
         thread.output_known.connect(self.status.set_output)
         thread.ramping.connect(self._ramps)

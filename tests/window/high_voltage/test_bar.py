@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import subprocess
 import sys
 import time
@@ -21,6 +22,7 @@ from dearig.window.high_voltage.state import HighVoltage, kilovolts
 from dearig.window.high_voltage.status import HighVoltageStatus, LatchedAlarm
 from dearig.window.rig.page import RigPage
 from dearig.window.run.page import RunPage
+from dearig.window.run.runner import Runner
 from dearig.window.session.state import Session
 from dearig.window.shell.frame import MainWindow
 from tests.window.conftest import SHORT, press
@@ -223,6 +225,61 @@ def test_a_window_that_was_killed_in_a_run_is_told_at_the_next_start(session: Se
     assert not session.blocks
     again = Session(session.folder, settings, address="daqmx:Dev1")
     assert HighVoltageStatus(again).alarm is None
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_while_another_window_plays_on_the_card_nothing_here_is_of_now(
+    session: Session, seen: bool
+) -> None:
+    settings = session.settings
+    session.set_address("daqmx:Dev1")
+    status = HighVoltageStatus(session)
+    runner = Runner(session)
+    status.set_output(OutputState(Known.CONFIRMED, 0.0, 0.0))
+    assert runner.arm(armed=True)
+    settings.sync()
+    other = subprocess.Popen(
+        [sys.executable, "-c", KILLED, settings.fileName(), "daqmx:Dev1"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert other.stdout is not None
+    assert other.stdout.readline().strip() == "playing"
+    if seen:
+        # between two looks nothing is begun either, and the note is that of the other window
+        assert not runner.status.run_begins()
+        status._look_at_clock()
+        assert status.state is HighVoltage.UNKNOWN
+        assert math.isnan(status.number[0])
+        assert "another window plays on this rig, seen at " in status.words
+        assert "another window" in session.blocks["played elsewhere"].sentence
+        assert not runner.armed
+        status._keep(None)
+        session.set_address("sim")
+        assert not session.blocks
+        session.set_address("daqmx:Dev1")
+        assert session.blocks
+    # it is killed in its run: this window says so, and has measured nothing since
+    other.communicate("k")
+    status._look_at_clock()
+    assert "played elsewhere" not in session.blocks
+    assert status.alarm is not None
+    assert status.alarm.text.startswith("The program ended during what was started on daqmx:Dev1")
+    status.acknowledge("Ada")
+    assert not session.blocks
+
+
+def test_after_the_run_of_another_window_the_output_is_to_be_read_again(session: Session) -> None:
+    session.set_address("daqmx:Dev1")
+    other = HighVoltageStatus(session)
+    assert other.run_begins()
+    status = HighVoltageStatus(Session(session.folder, session.settings, address="daqmx:Dev1"))
+    assert status.state is HighVoltage.UNKNOWN
+    other.run_ended(None)
+    status._look_at_clock()
+    assert status.state is HighVoltage.NOT_CONTACTED
+    assert "not read since another window played" in status.words
+    status.set_output(OutputState(Known.CONFIRMED, 0.0, 0.0))
+    assert status.state is HighVoltage.CONFIRMED
 
 
 def test_a_run_on_a_card_that_ends_well_leaves_nothing(session: Session) -> None:
