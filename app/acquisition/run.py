@@ -46,6 +46,7 @@ from dearig.progress import Progress, quiet
 from dearig.recording.content.metadata import RunMetadata
 from dearig.recording.files import check_output
 from dearig.recording.writing.disk_space import check_room
+from dearig.recording.writing.lost_file import LostFile, UnsavedFile
 from dearig.recording.writing.recorder import Recorder
 from dearig.recording.writing.writer import RecordingWriter
 
@@ -491,6 +492,8 @@ class _Run:
             recorder.close(outcome, event, level, given_up=self._given_up, progress=self._progress)
         except DearigError as error:
             trouble = error
+        if isinstance(trouble, UnsavedFile):
+            return trouble.clause if isinstance(said, LostFile) else str(trouble)
         if recorder.samples == 0:
             none = f"none of the samples is in {recorder.path}"
             where = none if recorder.received else "nothing was recorded"

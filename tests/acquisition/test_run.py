@@ -5,6 +5,7 @@ One piece: each way to end a run, with the same few checks of what is left.
 
 from __future__ import annotations
 
+import errno
 import io
 import signal
 import sys
@@ -652,6 +653,28 @@ def test_a_run_whose_file_is_deleted(
         assert any(line.startswith("stop at") for line in rig.diary)
     assert closed_at_zero(rig)
     assert not path.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="an open file cannot be deleted there")
+@pytest.mark.usefixtures("in_step")
+def test_a_run_whose_file_is_deleted_and_cannot_be_saved_is_not_said_to_be_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    path = tmp_path / "run.h5"
+    rig = Troubled("read", path.unlink)
+    monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
+    monkeypatch.setattr("dearig.recording.writing.writer.rescued", refused)
+    ticks = iter(np.arange(0.0, 100.0, 0.3))
+    with pytest.raises(DiskFault) as end:
+        record(LOADED, "sim", RigFile.model_validate({}), path, clock=lambda: next(ticks))
+    assert str(end.value) == (
+        f"{path} was deleted by another program during the run; the rig was made safe, and no "
+        f"copy could be saved (Permission denied): what was recorded is lost"
+    )
+    assert closed_at_zero(rig)
 
 
 def test_a_disk_that_is_full_to_the_end_keeps_the_counts(

@@ -14,7 +14,7 @@ from pathlib import Path
 from dearig.errors import DiskFault
 from dearig.recording.lock import FileLock, create_locked
 
-__all__ = ["LostFile", "find_loss", "free_name", "rescued"]
+__all__ = ["LostFile", "UnsavedFile", "find_loss", "free_name", "rescued"]
 
 #: Bytes copied at a time.
 PIECE = 2**22
@@ -24,6 +24,12 @@ class LostFile(DiskFault):
     """The file of a run is not what and where it was; ``intact`` where its content is."""
 
     intact = True
+
+
+class UnsavedFile(DiskFault):
+    """The content of a lost file is gone too; ``clause`` says so without how it was lost."""
+
+    clause = ""
 
 
 def find_loss(lock: FileLock, path: Path, size: int, mark: tuple[int, bytes]) -> LostFile | None:
@@ -54,11 +60,15 @@ def rescued(lock: FileLock, path: Path) -> tuple[Path, FileLock]:
     """Return path and lock of the content of ``lock``'s file, which is no longer at ``path``.
 
     That is the file itself where it was moved to, if the system tells, or else a copy next to
-    ``path``. Raises ``OSError`` where it cannot be copied.
+    ``path``; where its folder was deleted too, in the next one above that is there. Raises
+    ``OSError`` where it cannot be copied.
     """
     place = _place(lock)
     if place is not None:
         return place, lock
+    if not path.parent.is_dir():
+        folders = path.absolute().parents
+        path = next(f for f in folders if f.is_dir()) / path.name
     saved = free_name(path, "saved")
     copy = create_locked(saved)
     try:

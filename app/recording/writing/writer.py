@@ -67,7 +67,7 @@ from dearig.recording.reading.opening import UNREADABLE, opened
 from dearig.recording.writing.check_written import check_written
 from dearig.recording.writing.disk_space import advice
 from dearig.recording.writing.finish import finish
-from dearig.recording.writing.lost_file import LostFile, find_loss, free_name, rescued
+from dearig.recording.writing.lost_file import LostFile, UnsavedFile, find_loss, free_name, rescued
 
 __all__ = ["FLUSH_INTERVAL", "RecordingWriter"]
 
@@ -563,10 +563,10 @@ class RecordingWriter:
             try:
                 self._path, lock = rescued(self._lock, self._path)
             except (OSError, InputError) as error:
-                raise DiskFault(
-                    f"{self._lost}; no copy could be saved ({system_text(error)}), and what "
-                    f"was recorded is lost"
-                ) from error
+                clause = f"no copy could be saved ({system_text(error)}): what was recorded is lost"
+                unsaved = UnsavedFile(f"{self._lost}; {clause}")
+                unsaved.clause = clause
+                raise unsaved from error
         try:
             with lock:
                 finish(

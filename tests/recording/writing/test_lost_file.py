@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -35,6 +36,10 @@ def replace(path: Path) -> None:
     other = path.with_name("other")
     other.write_bytes(b"precious")
     other.replace(path)
+
+
+def delete_folder(path: Path) -> None:
+    shutil.rmtree(path.parent)
 
 
 def move(path: Path) -> None:
@@ -98,6 +103,7 @@ def holds(path: Path, start: int, stop: int) -> None:
     ("trouble", "said", "place"),
     [
         (delete, "was deleted by another program", "lab/run-saved.h5"),
+        (delete_folder, "was deleted by another program", "run-saved.h5"),
         (replace, "another file has taken the place of", "lab/run-saved.h5"),
         (move, r"was moved to .*elsewhere\.h5", "lab/elsewhere.h5"),
         (move_folder, r"was moved to .*renamed/run\.h5", "renamed/run.h5"),
