@@ -93,6 +93,24 @@ def test_a_waveform_from_csv(tmp_path: Path, column: str, factor: float) -> None
     assert loaded.toml == f"{toml}# segment 1: w.csv had sha256 {digest}\n"
 
 
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("time_s,voltage_kV,voltage_V", "voltage_kV and voltage_V"),
+        ("time_s,voltage_kV,voltage_kV", "voltage_kV and voltage_kV #3"),
+        ("time_s,voltage_kV,time_s", "time_s and time_s #3"),
+    ],
+)
+def test_a_waveform_with_two_voltages_or_times_is_refused(
+    tmp_path: Path, head: str, said: str
+) -> None:
+    # which of the two the operator has edited is not known
+    (tmp_path / "w.csv").write_text(f"{head}\n0,0,0\n1,1.5,3\n2,0,0\n", encoding="utf-8")
+    toml = HEAD + '[[segment]]\nkind = "csv"\nfile = "w.csv"\n'
+    with pytest.raises(InputError, match=f"{said}, which may contradict"):
+        parse_sequence(toml, "x", tmp_path)
+
+
 def test_a_run_as_long_as_it_may_be() -> None:
     text = 'name = "x"\nlead_in_s = 0.0\ntail_s = 0.0\n[[segment]]\nkind = "hold"\nduration_s = '
     longest = SAMPLES_MAX / 1000.0

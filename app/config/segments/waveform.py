@@ -58,12 +58,23 @@ class Csv(SegmentTable):
                 f"put the waveform itself next to the sequence"
             )
         source = TextFile(folder / place)
-        scale = next((k for k in self.columns if k in source.names), None)
-        if scale is None or "time_s" not in source.names:
+        # a name that comes again has its place behind it: voltage_kV #3
+        times, scales = (
+            [n for n in source.names if n.partition(" #")[0] in wanted]
+            for wanted in (("time_s",), self.columns)
+        )
+        if not scales or not times:
             raise InputError(
                 f"{source.path} has the columns {listing(source.names)}; a waveform takes time_s "
                 f"and {' or '.join(self.columns)}"
             )
+        for several in (times, scales):
+            if len(several) > 1:
+                raise InputError(
+                    f"{source.path} has the columns {' and '.join(several)}, which may contradict "
+                    f"each other; keep the one that is to be played"
+                )
+        scale = scales[0]
         for column in ("time_s", scale):
             source.check(column)
         columns = source.read(["time_s", scale])
