@@ -9,8 +9,9 @@ import weakref
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import tomli_w
 
 from dearig.acquisition.overlay import OverlayModel
@@ -330,6 +331,21 @@ def load_rig(source: RigSource | None) -> tuple[RigFile, str]:
         If the settings cannot be used.
     """
     if isinstance(source, Mapping):
-        text = tomli_w.dumps({name: dict(table) for name, table in source.items()})
+        try:
+            text = tomli_w.dumps(_plain(source))
+        except TypeError as error:  # None, an array, a key that is not a text
+            raise InputError(
+                f"the rig file: its tables have a value that a rig file cannot have ({error}); "
+                f"leave out the keys that have none"
+            ) from error
         return parse_rig_file(text), text
     return load_rig_file(source), "" if source is None else read_text(Path(source), "rig file")
+
+
+def _plain(value: Any) -> Any:
+    """Return ``value`` with the numbers of NumPy in it as those of Python."""
+    if isinstance(value, Mapping):
+        return {key: _plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    return value.item() if isinstance(value, np.generic) else value

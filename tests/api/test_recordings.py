@@ -79,6 +79,17 @@ def test_what_the_rig_does_not_allow_is_refused_before_anything_is_made(tmp_path
         dearig.record(LOBE, rig="simulated")
 
 
+def test_tables_of_a_rig_file_take_numbers_of_numpy_and_nothing_else() -> None:
+    limits = {"voltage_max_kV": np.float32(0.5), "time_at_voltage_max_s": np.int64(60)}
+    with pytest.raises(dearig.InputError, match=r"0\.5 kV is allowed"):
+        dearig.record(LOBE, rig_file={"limits": limits})
+    for wrong in (None, 2j, np.array([0.5])):
+        with pytest.raises(dearig.InputError, match="a value that a rig file cannot have"):
+            dearig.record(LOBE, rig_file={"limits": {"voltage_max_kV": wrong}})
+    with pytest.raises(dearig.InputError, match="a value that a rig file cannot have"):
+        dearig.record(LOBE, rig_file={"limits": None})  # type: ignore[dict-item]
+
+
 def test_a_run_that_ends_early_keeps_its_temporary_file() -> None:
     with pytest.raises(dearig.SafetyStop) as raised:
         dearig.record(LOBE, rig="sim:3", rig_file=SLOW_RIG, faults=["arc@0.8"])
