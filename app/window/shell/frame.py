@@ -22,6 +22,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QAbstractScrollArea,
     QApplication,
+    QDialog,
     QFrame,
     QHBoxLayout,
     QListWidget,
@@ -193,7 +194,10 @@ class MainWindow(QMainWindow):
         Unsaved texts are kept for the next start.
         """
         self._closing = self._by_signal = True
-        self.close()
+        for dialog in self.findChildren(QDialog):
+            if dialog.isVisible():
+                dialog.reject()  # no one is there to answer it
+        self.close()  # without effect in a question of ``closeEvent``, which goes on by itself
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Fit the window, with its frame, into the screen: the bar with STOP must be visible."""
@@ -254,7 +258,8 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Ask during a run, and make the rig safe whatever the answer."""
         runner = self.run_page.runner
-        if runner.running and not self._closing and not self._ask_to_close():
+        asks = runner.running and not self._closing
+        if asks and not self._ask_to_close() and not self._by_signal:
             event.ignore()
             return
         self._closing = True
@@ -263,7 +268,8 @@ class MainWindow(QMainWindow):
             runner.stop("the end of the window")
             event.ignore()
             return
-        if not self._by_signal and not may_close(self, self.session):
+        closes = self._by_signal or may_close(self, self.session)
+        if not closes and not self._by_signal:  # a signal may come while the question is open
             self._closing = False
             event.ignore()
             return

@@ -353,6 +353,33 @@ def test_closing_in_mid_run_makes_safe_whatever_the_answer(
         assert page.arm_button.isEnabled()
 
 
+def test_a_signal_closes_the_window_while_it_asks(
+    qtbot: QtBot, quick_ramp: Session, window: MainWindow
+) -> None:
+    """At the end of a session no one answers, and the system kills what does not end."""
+    page = window.run_page
+    page.paced.setChecked(True)
+    press(qtbot, page.arm_button)
+    press(qtbot, page.start_button)
+    qtbot.waitUntil(lambda: seconds(page) > 0.2, timeout=RUN_MS)
+
+    def leave() -> None:
+        if any(w.isVisible() for w in window.findChildren(QMessageBox)):
+            window.leave()
+        else:
+            QTimer.singleShot(20, leave)
+
+    QTimer.singleShot(0, leave)
+    late = QTimer(window, interval=10_000, singleShot=True)
+    late.timeout.connect(lambda: answer("Keep open"))  # the test ends also where it fails
+    late.start()
+    window.close()
+    late.stop()
+    qtbot.waitUntil(lambda: not window.isVisible(), timeout=RUN_MS)
+    assert page.runner.state is HighVoltage.CONFIRMED
+    assert at_zero(open_recording(next(window.session.folder.glob("*.h5"))))
+
+
 def test_what_was_armed_is_disarmed_when_the_sequence_changes(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:
