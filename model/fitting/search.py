@@ -21,7 +21,7 @@ from dearig.model.fitting.problem import Problem
 from dearig.model.kinematics import electric_along
 from dearig.model.readings.records import ActuatorRecord, FilmRecord, Record
 from dearig.model.simulation.actuator import Actuator
-from dearig.model.simulation.strip import unit_stresses
+from dearig.model.simulation.strip import network_stress, through_effects, unit_stresses
 from dearig.model.springs import SPRING_LAWS
 
 __all__ = [
@@ -44,6 +44,9 @@ _LEAST = {"mu": 1e-9, "J": 1e-9, "T": 1e-300}  # of Algorithm 1's values, natura
 _STATED_POINTS = 4  # of a range that is stated of a relaxation time
 _TIME_ERROR = 1e-9  # of the logarithm of a time: rounding
 _OUT = 1e6  # cost of a branch outside of its range, above any distance from a prior
+_READ_TURNS = 8  # at most, of a search with effects; with slack two were enough
+_READ_STEP = 1e-3  # of the largest stress: step of a difference quotient
+_READ_CHANGE = 0.01  # of the misfit, below which the search is not repeated
 _SETS_MAX = 6000  # of branches, each tried by least squares: a third of a second
 
 
@@ -230,7 +233,9 @@ def film_starts(
 
     With the stretch imposed the stress is linear in the moduli: an exhaustive search over sets of
     branches (each a relaxation time and a locking limit) and over the starts of the equilibrium
-    spring's law, with non-negative least squares for the moduli.
+    spring's law, with non-negative least squares for the moduli. What is read is another function
+    of the stress where the model has effects, such as slack: it is taken linear about the stress
+    of the best set, and the search repeated.
     """
     layout = problem.layout
     records = [r for r in problem.records if isinstance(r, FilmRecord)]
@@ -247,7 +252,6 @@ def film_starts(
     limits: tuple[float, ...] = (_WIDE_LIMIT, 1.0, 0.03)
     if not stiffening or layout.network.springs[-1].kind != "gent":
         limits = limits[:1]
-    weight = 1.0 / problem.sigma
     found: list[tuple[float, np.ndarray]] = []
     for n, first in enumerate(firsts):
         groups = []
@@ -262,9 +266,51 @@ def film_starts(
         if groups:
             candidates = np.concatenate([group for group, _ in groups])
             parts = np.concatenate([groups[0][1][:1], *(part[1:] for _, part in groups)])
-            found += _subsets(layout, first, candidates, parts * weight, problem.measured * weight)
+            found += _read_sets(problem, records, first, candidates, parts)
         progress("global search", (n + 1) / len(firsts))
     return _ranked(layout, found, starts)
+
+
+def _read_sets(
+    problem: Problem,
+    records: Sequence[FilmRecord],
+    first: tuple[float, ...],
+    candidates: np.ndarray,
+    parts: np.ndarray,
+) -> list[tuple[float, np.ndarray]]:
+    """Return sets as ``_subsets`` does, for what is read through the effects of the model.
+
+    ``parts`` (1 + G, N) are stresses per unit modulus.
+    """
+    layout, weight = problem.layout, 1.0 / problem.sigma
+    own = layout.coefficients(layout.initial())[0]
+
+    def read(stress: np.ndarray) -> np.ndarray:
+        pieces = np.split(stress, np.cumsum([r.time.size for r in records])[:-1])
+        return np.concatenate(
+            [
+                through_effects(own, r.time, r.stretch, piece)
+                for r, piece in zip(records, pieces, strict=True)
+            ]
+        )
+
+    stress, before = problem.measured, inf
+    small = _READ_STEP * float(np.max(np.abs(stress)))
+    found: list[tuple[float, np.ndarray]] = []
+    for _ in range(_READ_TURNS):
+        there = read(stress)
+        slope = (read(stress + small) - there) / small
+        target = (problem.measured - there + slope * stress) * weight
+        found = _subsets(layout, first, candidates, parts * (slope * weight), target)
+        misfit, x = min(found, key=lambda f: f[0], default=(0.0, np.empty(0)))
+        if np.array_equal(there, stress) or abs(before - misfit) <= _READ_CHANGE * misfit:
+            break
+        c = layout.coefficients(layout.values(x))[0]
+        followed = [network_stress(c, r.time, r.stretch) for r in records]
+        if any(status != kernel.OK for _, status, _ in followed):
+            break
+        stress, before = np.concatenate([piece for piece, _, _ in followed]), misfit
+    return found
 
 
 def resolved_times(records: Sequence[Record]) -> tuple[float, float]:

@@ -17,7 +17,14 @@ from dearig.model.film.specimen import KINEMATICS
 from dearig.model.simulation.actuator import STATUS_TEXTS, effect_values
 from dearig.model.simulation.film_kernel import add_effects, drive_by_stretch
 
-__all__ = ["StressResponse", "Strip", "stress_of", "unit_stresses"]
+__all__ = [
+    "StressResponse",
+    "Strip",
+    "network_stress",
+    "stress_of",
+    "through_effects",
+    "unit_stresses",
+]
 
 
 @dataclass(frozen=True)
@@ -85,13 +92,28 @@ class Strip:
 
 def stress_of(c: np.ndarray, time: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, int, int]:
     """``(stress, status, reached)`` of coefficient vector ``c`` (see ``model.coefficients``)."""
+    stress, status, reached = network_stress(c, time, stretch)
+    return through_effects(c, time, stretch, stress), status, reached
+
+
+def network_stress(
+    c: np.ndarray, time: np.ndarray, stretch: np.ndarray
+) -> tuple[np.ndarray, int, int]:
+    """``(stress, status, reached)`` of the springs of ``c`` alone, without its effects."""
     parts, status, reached = unit_stresses(c, time, stretch)
-    stress = c[HEAD + MODULUS :: WIDTH] @ parts
-    if not np.array_equal(c[EFFECTS_AT : EFFECTS_AT + PARAMETER_COUNT], NEUTRAL):
-        c = c.copy()
-        c[REST] = stretch[0]
-        add_effects(c, read_only(time), read_only(stretch), np.zeros(MEMORY), stress)
-    return stress, status, reached
+    return c[HEAD + MODULUS :: WIDTH] @ parts, status, reached
+
+
+def through_effects(
+    c: np.ndarray, time: np.ndarray, stretch: np.ndarray, stress: np.ndarray
+) -> np.ndarray:
+    """Return what is read of the network's ``stress`` (N,) with the effects of ``c``, in Pa."""
+    if np.array_equal(c[EFFECTS_AT : EFFECTS_AT + PARAMETER_COUNT], NEUTRAL):
+        return stress
+    c, read = c.copy(), stress.copy()
+    c[REST] = stretch[0]
+    add_effects(c, read_only(time), read_only(stretch), np.zeros(MEMORY), read)
+    return read
 
 
 def unit_stresses(
