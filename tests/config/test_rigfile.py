@@ -90,6 +90,8 @@ MISTAKES = [
         r"film\.length_mm = -75 is not allowed, but a number above 0, at most 10000 \(free length",
     ),
     ("[film]\nlength_mm = '75'", r'film\.length_mm = "75" is not allowed, but a number'),
+    ("[film]\nwidth_mm = 1e-320", r"film\.width_mm = .* it is too small to be meant"),
+    ("[card]\ntimebase_MHz = 1e-320", r"card\.timebase_MHz = .* it is too small to be meant"),
     ("[film]\nlength_mm = nan", r"film\.length_mm = NaN is not allowed"),
     ("[film]\nlength_mm = true", r"film\.length_mm = true is not allowed"),
     ("[card]\nai_buffer_samples = 1.5", r"= 1\.5 is not allowed, but a whole number from 1000"),

@@ -26,8 +26,9 @@ _TEXTS = {
 
 
 def sign_text(kind: str, drive: np.ndarray, signal: np.ndarray) -> str:
-    """Return a sentence where ``signal`` (N,), as far as it is known, falls while ``drive`` (N,) rises, else "".
+    """Return a sentence where ``signal`` (N,) falls while ``drive`` (N,) rises, else "".
 
+    Missing readings are NaN, and do not count.
     ``kind`` is that of the recording. An actuator's drive is its voltage: the Maxwell stress goes
     with its square, so the sign of the voltage does not matter. A film's drive is its stretch.
     """
