@@ -35,7 +35,7 @@ from dearig.drivers.gate import Margin
 from dearig.errors import InputError
 from dearig.model.simulation.actuator import Actuator
 from dearig.progress import Progress, quiet
-from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.files import check_output, check_recording_name, replaced_when_done
 from dearig.recording.reading import recording as stored
 from dearig.recording.reading.origin import origin_of
 from dearig.recording.reading.reader import open_recording
@@ -255,6 +255,8 @@ def record(
     >>> run.plot()
     """
     check_simulation(rig, seed, paced)
+    if path is not None:
+        check_recording_name(Path(path))
     settings, text = load_rig(rig_file)
     loaded = as_loaded(sequence)
     actuator = None

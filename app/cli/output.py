@@ -52,7 +52,7 @@ def check_files(
     name of a preset is not a file and does no harm here). ``recording`` is the output that will be
     a recording.
     """
-    from dearig.recording.files import check_output
+    from dearig.recording.files import check_output, check_recording_name
 
     read = [source for source in sources if source is not None]
     written = [*outputs, *([] if json in (None, "-") else [Path(str(json))])]
@@ -60,11 +60,8 @@ def check_files(
         check_output(path, force, *read)
         if any(os.path.realpath(path) == os.path.realpath(other) for other in written[:i]):
             raise InputError(f"{path} is named for two outputs; give each output its own name")
-    if recording is not None and recording.suffix.lower() not in (".h5", ".hdf5", ".nxs"):
-        raise InputError(
-            f"{recording} would be a recording, which is an HDF5 file; end its name in .h5 "
-            f"(dearig export converts a recording to CSV, MAT or Parquet)"
-        )
+    if recording is not None:
+        check_recording_name(recording)
 
 
 def console_for(json: str | None = None) -> Console:

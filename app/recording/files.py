@@ -25,6 +25,7 @@ from dearig.recording.lock import (
 
 __all__ = [
     "check_output",
+    "check_recording_name",
     "errno_of",
     "file_sha256",
     "journal_of",
@@ -45,6 +46,16 @@ PARTIAL = ".dearig-"
 _PARTIAL_NAME = re.compile(re.escape(PARTIAL) + r"[0-9a-f]{16}\.partial")
 #: s after which an unfinished output counts as abandoned in a folder without locks.
 ABANDONED = 86400.0
+
+
+def check_recording_name(path: Path) -> None:
+    """Raise ``InputError`` for a recording that is to have another name than an HDF5 file's."""
+    if path.suffix.lower() not in (".h5", ".hdf5", ".nxs"):
+        raise InputError(
+            f"{path} would be a recording, which is an HDF5 file; end its name in .h5 (a recording "
+            f"is exported to CSV, MAT or Parquet)",
+            option="out",
+        )
 
 
 def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Path:
