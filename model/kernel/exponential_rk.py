@@ -214,10 +214,10 @@ def film_steps(
         rise, later = lam * (em - electric_gain * fa), lam * (eb - em)
         slope = rise * per_half
         bz, bv, bi = bz + q1 * slope, bv + q2 * slope, bi + q3 * slope
-        gave = bi - inner
-        h1 = x1 + f1 * faded_half + s1 * gave
-        h2 = x2 + f2 * faded_half + s2 * gave
-        h3 = x3 + f3 * faded_half + s3 * gave
+        change = bi - inner
+        h1 = x1 + f1 * faded_half + s1 * change
+        h2 = x2 + f2 * faded_half + s2 * change
+        h3 = x3 + f3 * faded_half + s3 * change
         z, v, i = bz + p1 * first, bv + p2 * first, bi + p3 * first
         mid_z, mid_v, mid_i = z, v, i
         z1, z2, z3 = h1 + s1p * first, h2 + s2p * first, h3 + s3p * first
@@ -237,10 +237,10 @@ def film_steps(
                 acting, c, memory, there, v, warmth, lam, half, t, fm, pull, stress, over
             )  # fmt: skip
         second = a + (load + k * z + d * v - w * i)
-        went = z - relaxation * i
-        o1 = r1 * t1 - (s1 * went + f1 * left_half)
-        o2 = r2 * t2 - (s2 * went + f2 * left_half)
-        o3 = r3 * t3 - (s3 * went + f3 * left_half)
+        flow = z - relaxation * i
+        o1 = r1 * t1 - (s1 * flow + f1 * left_half)
+        o2 = r2 * t2 - (s2 * flow + f2 * left_half)
+        o3 = r3 * t3 - (s3 * flow + f3 * left_half)
         sum_1, sum_2, sum_3 = 2.0 * o1, 2.0 * o2, 2.0 * o3
 
         # stage 3, the middle: u_3 = E u_0 + (h/2) phi_1 (N_2 - R) + (h/2)^2 phi_2 R/(h/2)
@@ -265,10 +265,10 @@ def film_steps(
                 acting, c, memory, there, v, warmth, lam, half, t, fm, pull, stress, over
             )  # fmt: skip
         third = a + (load + k * z + d * v - w * i)
-        went = z - relaxation * i
-        o1 = r1 * t1 - (s1 * went + f1 * left_half)
-        o2 = r2 * t2 - (s2 * went + f2 * left_half)
-        o3 = r3 * t3 - (s3 * went + f3 * left_half)
+        flow = z - relaxation * i
+        o1 = r1 * t1 - (s1 * flow + f1 * left_half)
+        o2 = r2 * t2 - (s2 * flow + f2 * left_half)
+        o3 = r3 * t3 - (s3 * flow + f3 * left_half)
         sum_1, sum_2, sum_3 = sum_1 + 2.0 * o1, sum_2 + 2.0 * o2, sum_3 + 2.0 * o3
 
         # stage 4, the end: u_4 = E u_2 + (h/2) phi_1 (2 N_3 - N_1 - R) + (h/2)^2 phi_2 R'/(h/2)
@@ -278,10 +278,10 @@ def film_steps(
         bi = e31 * mid_z + e32 * mid_v + e33 * mid_i + q3 * slope
         push = 2.0 * third - (first + rise)
         z, v, i = bz + p1 * push, bv + p2 * push, bi + p3 * push
-        gave = bi - inner
-        z1 = (x1 + s1 * gave + f1 * faded + h * o1) + s1p * push
-        z2 = (x2 + s2 * gave + f2 * faded + h * o2) + s2p * push
-        z3 = (x3 + s3 * gave + f3 * faded + h * o3) + s3p * push
+        change = bi - inner
+        z1 = (x1 + s1 * change + f1 * faded + h * o1) + s1p * push
+        z2 = (x2 + s2 * change + f2 * faded + h * o2) + s2p * push
+        z3 = (x3 + s3 * change + f3 * faded + h * o3) + s3p * push
         there = (lam + bz) + p1 * push
         p = there * there
         t1, t2, t3 = (
@@ -298,22 +298,22 @@ def film_steps(
                 acting, c, memory, there, v, warmth, lam, h, t, fb, pull, stress, over
             )  # fmt: skip
         fourth = a + (load + k * z + d * v - w * i)
-        went = z - relaxation * i
+        flow = z - relaxation * i
 
         # the step: e^{Lh} u_0 + h (weights of N_1, N_2 + N_3, N_4); section 5 for the branches
         lam0, both = lam, second + third
         moved += w1 * speed + w13 * inner + a1 * first + b1 * both + c1 * fourth
         lam = origin + moved
-        gave = w3 * speed + (w33 - 1.0) * inner + a3 * first + b3 * both + c3 * fourth
+        change = w3 * speed + (w33 - 1.0) * inner + a3 * first + b3 * both + c3 * fourth
         speed = w2 * speed + w23 * inner + a2 * first + b2 * both + c2 * fourth
         if acting:
-            met = abs(first_film(speed))
-            slow, fast = min(slow, met), max(fast, met)
+            rate = abs(first_film(speed))
+            slow, fast = min(slow, rate), max(fast, rate)
         if acting & COMMIT:
             commit(acting, c, memory, lam, speed, lam0, h, t)
-        moved1 += sixth * (sum_1 + r1 * t1 - (s1 * went + f1 * left)) + s1 * gave + f1 * faded
-        moved2 += sixth * (sum_2 + r2 * t2 - (s2 * went + f2 * left)) + s2 * gave + f2 * faded
-        moved3 += sixth * (sum_3 + r3 * t3 - (s3 * went + f3 * left)) + s3 * gave + f3 * faded
+        moved1 += sixth * (sum_1 + r1 * t1 - (s1 * flow + f1 * left)) + s1 * change + f1 * faded
+        moved2 += sixth * (sum_2 + r2 * t2 - (s2 * flow + f2 * left)) + s2 * change + f2 * faded
+        moved3 += sixth * (sum_3 + r3 * t3 - (s3 * flow + f3 * left)) + s3 * change + f3 * faded
         x1, x2, x3 = origin + moved1, origin + moved2, origin + moved3
     trace[0], trace[1], trace[2] = last, last_but_one, bend
     trace[3], trace[4] = spread(slow, moved), spread(fast, moved)
