@@ -201,10 +201,7 @@ class HighVoltageStatus(QObject):
         elif self.live:
             words = self.silence
         elif self._elsewhere:
-            words = (
-                f"another window plays on this rig, seen at {self._elsewhere}: its voltage is "
-                f"shown there, and STOP works there only"
-            )
+            words = f"another window plays (seen {self._elsewhere}): STOP works there only"
         else:
             output = self.output
             words = self._unread if output is None else output.sentence
