@@ -6,6 +6,7 @@ A system grants them to an administrator or by its settings: on Linux ``rtprio``
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import re
@@ -13,10 +14,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-__all__ = ["claim"]
+__all__ = ["claim", "give_way"]
 
 _REALTIME = 20  # of 1 to 99: above ordinary processes, below the kernel's interrupt threads at 50
 _NICE = -20  # the highest priority among ordinary processes
+_WAY = 10  # added to the nice value: a tenth of the share of a process that does not give way
 
 # from <sys/mman.h>: present and future pages, each locked when it is first used
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
@@ -40,6 +42,18 @@ def claim() -> tuple[list[str], list[str]]:
                 granted.append(words)
                 break
     return granted, refused
+
+
+def give_way() -> None:
+    """Let other processes go first where all cores are busy: the window, and who plays a run.
+
+    It is for long computations. Threads that are there already keep their priority on Linux.
+    """
+    if sys.platform == "win32":
+        with contextlib.suppress(OSError):  # a lower priority than that is in force
+            _windows_class(_BELOW_NORMAL_CLASS)
+    else:
+        os.nice(_WAY)
 
 
 def _requests() -> list[list[tuple[str, Callable[[], None]]]]:
@@ -106,7 +120,7 @@ def _may_lock_beyond_limit() -> bool:
 # ---------------------------------------------------------------- Windows
 
 # from winbase.h and memoryapi.h
-_HIGH_CLASS, _REALTIME_CLASS = 0x80, 0x100
+_BELOW_NORMAL_CLASS, _HIGH_CLASS, _REALTIME_CLASS = 0x4000, 0x80, 0x100
 _WORKING_SET_MINIMUM_IS_HARD = 0x1
 _WORKING_SET_SPARE = 32 << 20  # bytes above the present size
 

@@ -111,6 +111,7 @@ def acts(window: MainWindow, folder: Path) -> Iterator[tuple[str, Callable[[], o
     table = recordings.table
     paths = sorted(folder.glob("*.h5"))
     window.show_page(recordings)
+    run_event_loop(0.5)
     yield "Recordings: select all", table.selectAll
     yield "Recordings: search", lambda: recordings.filter.setText("thesis-01")
     yield "Recordings: search ends", recordings.filter.clear
@@ -124,6 +125,7 @@ def acts(window: MainWindow, folder: Path) -> Iterator[tuple[str, Callable[[], o
     window.show_page(study)
     paper = folder / f"study-{1 + len([*folder.glob('study-*')])}"
     view = view_of(study_on_paper(paper, diagnose_outcome(title="bench")))
+    run_event_loop(0.5)  # to open a page is an act of its own
     yield "Study: check all", lambda: study.recordings.check(paths[1:], paths[:1])
     yield "Study: check none", lambda: study.recordings.check([], [])
     yield "Study: a result arrives", lambda: study.show_view(view)

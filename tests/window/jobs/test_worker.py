@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -58,6 +59,10 @@ def stubborn(progress: Progress) -> None:
             progress("heard, and going on", 0.5)
 
 
+def niceness(progress: Progress) -> int:
+    return os.getpriority(os.PRIO_PROCESS, 0)
+
+
 class _Deaf:
     """What is deleted loses an interrupt: ``__del__`` cannot raise it."""
 
@@ -106,6 +111,14 @@ def test_a_job_gives_its_result_and_its_progress(qtbot, worker):
     # a change too small to be seen is not worth a message
     assert stages == [("doubling", 0.5), ("doubling", 1.0)]
     assert not worker.busy
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="priorities of POSIX")
+def test_the_window_and_a_run_come_before_its_jobs(qtbot, worker):
+    """On two cores a press of STOP waited twice as long for a job that reads recordings."""
+    seen = ended(worker.submit(niceness))
+    qtbot.waitUntil(lambda: seen != [], timeout=_PATIENCE)
+    assert seen == [("done", min(os.getpriority(os.PRIO_PROCESS, 0) + 10, 19))]
 
 
 def test_jobs_come_in_their_order_but_for_those_put_first(qtbot, worker):
