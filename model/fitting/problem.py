@@ -112,6 +112,11 @@ class Problem:
         self.readings = self.measured = readings
 
     @property
+    def edges(self) -> np.ndarray:
+        """Where each record's readings begin, and where the last ends: (K + 1,)."""
+        return self._edges
+
+    @property
     def samples(self) -> int:
         """Number of readings and priors that are fitted."""
         return self.readings_fitted + self._priors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import comb, inf
 from typing import Any
 
@@ -233,9 +233,9 @@ def film_starts(
 
     With the stretch imposed the stress is linear in the moduli: an exhaustive search over sets of
     branches (each a relaxation time and a locking limit) and over the starts of the equilibrium
-    spring's law, with non-negative least squares for the moduli. What is read is another function
-    of the stress where the model has effects, such as slack: it is taken linear about the stress
-    of the best set, and the search repeated.
+    spring's law, with non-negative least squares for the moduli. With effects such as slack the
+    reading is not the stress of the springs: it is linearised about the stress of the best set,
+    and the search is repeated.
     """
     layout = problem.layout
     records = [r for r in problem.records if isinstance(r, FilmRecord)]
@@ -286,11 +286,10 @@ def _read_sets(
     own = layout.coefficients(layout.initial())[0]
 
     def read(stress: np.ndarray) -> np.ndarray:
-        pieces = np.split(stress, np.cumsum([r.time.size for r in records])[:-1])
         return np.concatenate(
             [
-                through_effects(own, r.time, r.stretch, piece)
-                for r, piece in zip(records, pieces, strict=True)
+                through_effects(own, r.time, r.stretch, stress[a:b])
+                for r, (a, b) in zip(records, pairwise(problem.edges), strict=True)
             ]
         )
 

@@ -263,8 +263,3 @@ class WhitenedProblem(Problem):
     def of_channels(self, residuals: np.ndarray) -> np.ndarray:
         """Return the part of ``residuals`` that belongs to electrical channels: none here."""
         return residuals[residuals.size :]
-
-    @property
-    def edges(self) -> np.ndarray:
-        """Where each record's readings begin, and where the last ends: (K + 1,)."""
-        return self._edges

@@ -62,6 +62,7 @@ __all__ = [
     "LINEAR",
     "MESSAGE_BYTES",
     "MISSING",
+    "PRESENT_MIN",
     "REQUIRED",
     "SIGNALS",
     "TIMING",
@@ -158,6 +159,8 @@ TIMING = ("skew_s", "delay_s", "delay_error_s")
 
 #: Attribute of a row: how many of its readings are missing, which are NaN; absent where none is.
 MISSING = "missing"
+#: Readings of such a row that are not missing, at least: a line across the gaps has two ends.
+PRESENT_MIN = 2
 
 #: Column of an exported table without metadata: conversions whose mean each row is, if several.
 AVERAGE_COLUMN = "conversions_per_row"

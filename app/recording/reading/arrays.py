@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.content.layout import UNITS, missing_in
+from dearig.recording.content.layout import PRESENT_MIN, UNITS, missing_in
 from dearig.recording.content.physical import Counts, Rest
 from dearig.recording.content.pyramid import reduced
 from dearig.recording.content.rest_noise import lead_in
@@ -24,9 +24,6 @@ from dearig.recording.reading.opening import identifier_of, read_from
 __all__ = ["Arrays", "Overview"]
 
 T = TypeVar("T")
-
-#: Readings of a channel that are not missing, at least: a line across the others has two ends.
-READINGS_MIN = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +156,7 @@ class Arrays:
         count = int(np.count_nonzero(gaps))
         # the first part of a recording may have fewer gaps than all of it
         known = count == missing or (count < missing and self.samples < self._in_file)
-        if known and finite.size - count >= READINGS_MIN:
+        if known and finite.size - count >= PRESENT_MIN:
             finite |= gaps
         if not finite.all() and name != "displacement_model":
             at = int(np.argmin(finite))

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from dearig.errors import InputError
+from dearig.recording.content.layout import PRESENT_MIN
 from dearig.recording.importers.columns.chosen import Chosen, Pick
 from dearig.recording.importers.columns.markers import markers_in
 from dearig.units import counted
@@ -19,8 +20,6 @@ _MARKED = frozenset(
     {"displacement", "force", "nominal_stress", "true_stress", "strain", "stretch", "current"}
 )
 _STEPPED = frozenset({"time", "voltage", "voltage_monitor", "temperature"})
-#: Readings of a column, at least: a line across those that are missing has two ends.
-_READINGS_MIN = 2
 
 
 def without_rows(
@@ -88,10 +87,10 @@ def without_readings(
         at = int(np.argmax(other if other.any() else gaps))
         cell = getattr(source, "cell", None)
         why = "" if cell is None else cell(at, name)
-        if (left := rows - int(gaps.sum())) < _READINGS_MIN:
+        if (left := rows - int(gaps.sum())) < PRESENT_MIN:
             raise InputError(
                 f"{source.path}: column {name!r} has {counted(left, 'number')} in "
-                f"{counted(rows, 'row')}, and at least {_READINGS_MIN} are needed"
+                f"{counted(rows, 'row')}, and at least {PRESENT_MIN} are needed"
                 f"{why and f' ({source.row(at)}: {why})'}: is it the right column?"
             )
         if count := int(other.sum()):
