@@ -14,11 +14,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-__all__ = ["claim", "give_way"]
+__all__ = ["claim", "lower_priority"]
 
 _REALTIME = 20  # of 1 to 99: above ordinary processes, below the kernel's interrupt threads at 50
 _NICE = -20  # the highest priority among ordinary processes
-_WAY = 10  # added to the nice value: a tenth of the share of a process that does not give way
+_LOWER = 10  # added to the nice value: on a busy core, a tenth of an ordinary process's time
 
 # from <sys/mman.h>: present and future pages, each locked when it is first used
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
@@ -44,16 +44,16 @@ def claim() -> tuple[list[str], list[str]]:
     return granted, refused
 
 
-def give_way() -> None:
-    """Let other processes go first where all cores are busy: the window, and who plays a run.
+def lower_priority() -> None:
+    """Lower the priority of this process, for long computations next to a window or a run.
 
-    It is for long computations. Threads that are there already keep their priority on Linux.
+    On Linux, threads that have started already keep theirs.
     """
     if sys.platform == "win32":
         with contextlib.suppress(OSError):  # a lower priority than that is in force
             _windows_class(_BELOW_NORMAL_CLASS)
     else:
-        os.nice(_WAY)
+        os.nice(_LOWER)
 
 
 def _requests() -> list[list[tuple[str, Callable[[], None]]]]:

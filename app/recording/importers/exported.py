@@ -41,13 +41,13 @@ T = TypeVar("T", Film, Load)
 class Exported:
     """Fields as in a ``Recording``; missing or invalid ones have their defaults.
 
-    ``channels`` are the columns of declared channels: name, unit and label; ``computed`` are the
-    columns that a model computed, which are not imported. ``missing`` are the columns with readings
-    that are missing. ``timing`` are skew, delay and the error
-    of the delay of the displacement in s. ``origin`` has those values of the provenance that say
-    where the data are from. ``rest_reading`` is that of a displacement that is counted from it
-    already, None if the file tells none. ``started`` is the Unix time in s of the start of the run,
-    None if the file does not tell it.
+    ``channels`` are the columns of declared channels: name, unit and label; ``computed`` are
+    the columns that a model computed, which are not imported. ``missing`` are the columns with
+    missing readings. ``timing`` are skew, delay and the error of the delay of the displacement
+    in s. ``origin`` has those values of the provenance that say where the data are from.
+    ``rest_reading`` is that of a displacement that is counted from it already, None if the file
+    tells none. ``started`` is the Unix time in s of the start of the run, None if the file does
+    not tell it.
     """
 
     hold: bool = False

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from dearig.drivers.processes.priority import give_way
+from dearig.drivers.processes.priority import lower_priority
 from dearig.errors import DearigError, noted
 
 __all__ = ["CURRENT", "Request", "StopRequest", "WorkerMessage", "broken", "serve"]
@@ -58,7 +58,7 @@ class WorkerMessage:
 def serve(connection: Connection) -> None:
     """Do the jobs that come through ``connection`` until its other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    give_way()  # STOP and a run in the window come first
+    lower_priority()  # STOP and a run in the window come first
     lost = threading.Event()  # an interrupt that a callback could not raise
     sys.unraisablehook = lambda found: _unraisable(found, lost)
     work: queue.SimpleQueue[Request] = queue.SimpleQueue()

@@ -197,7 +197,7 @@ class MainWindow(QMainWindow):
         for dialog in self.findChildren(QDialog):
             if dialog.isVisible():
                 dialog.reject()  # no one is there to answer it
-        self.close()  # without effect in a question of ``closeEvent``, which goes on by itself
+        self.close()  # does nothing while ``closeEvent`` asks: it closes when the question ends
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Fit the window, with its frame, into the screen: the bar with STOP must be visible."""

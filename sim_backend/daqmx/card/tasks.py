@@ -85,8 +85,8 @@ class Listener:
 
     ``signal`` is DAQmx's signal of an event by a signal, which comes with every sample.
 
-    ``owner`` is the call that listens. ``reported`` is the number of events signalled since the
-    last start; ``due`` has the status of each unsent one.
+    ``owner`` is the call that waits for the events. ``reported`` counts those since the last start;
+    ``due`` has the status of each that was not sent yet.
     """
 
     every: int | None

@@ -109,7 +109,7 @@ def own_scale(data: h5py.Dataset) -> str:
     return f"{found[0]} = {', '.join(f'{one:g}' for one in found[1][:4])}" if found else ""
 
 
-#: Attributes with values that stand for no reading.
+#: Attributes whose values mark a missing reading.
 _GAPS = ("_FillValue", "missing_value")
 #: Attributes by which CF scales, if they are numbers.
 _OF_CF = ("scale_factor", "add_offset")
